@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: Apache-2.0
+# The only build file. Everything made lies under $(BUILD); a flavour is a
+# build folder: make BUILD=build/asan FLAVOUR=sanitize check-here
+
+BUILD   ?= build
+FLAVOUR ?= plain
+PREFIX  ?= /usr/local
+VERSION := $(shell git describe --tags --always --dirty 2>/dev/null || echo 0.1)
+
+FOLDERS  := base files colorimetry drivers simulator render config calibration daemon
+PROGRAMS := boothd boothctl boothcal boothsim
+boothd_in := daemon
+boothctl_in := daemon
+boothcal_in := calibration
+boothsim_in := simulator
+
+PACKAGES := git make gcc g++ libc6-dev pkg-config libusb-1.0-0-dev libudev-dev libmodbus-dev libhidapi-dev \
+  libopencv-core-dev libopencv-calib3d-dev libceres-dev libopenexr-dev libglfw3-dev libepoxy-dev \
+  libegl-dev libgl1-mesa-dri libinih-dev libjansson-dev libpng-dev libmatio-dev libsystemd-dev \
+  libcmocka-dev libumockdev-dev umockdev xvfb xauth systemd psychtoolbox-3-common
+PKGS := libusb-1.0 libudev libmodbus hidapi-hidraw OpenEXR glfw3 epoxy egl inih jansson libpng matio \
+  libsystemd cmocka umockdev-1.0
+
+OPTIMISE := -O2
+SANITIZE_sanitize := -fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer
+SANITIZE := $(SANITIZE_$(FLAVOUR))
+WARN     := -Wall -Wextra -Werror -Wshadow -Wvla -Wswitch-enum
+INCLUDES  = -I. -I$(BUILD) $(shell pkg-config --cflags $(PKGS)) -isystem /usr/include/opencv4 -isystem /usr/include/eigen3
+ALL_C     = -std=c11 -D_GNU_SOURCE $(OPTIMISE) -g -fPIC -fopenmp $(WARN) -Wstrict-prototypes -Wmissing-prototypes \
+            -DBOOTHD_VERSION='"$(VERSION)"' -DBOOTHD_DATADIR='"$(PREFIX)/share/boothd"' $(INCLUDES) $(SANITIZE) $(CFLAGS)
+ALL_CXX   = -std=c++17 -D_GNU_SOURCE $(OPTIMISE) -g -fPIC -fopenmp -Wall -Wextra -Werror $(INCLUDES) $(SANITIZE) $(CXXFLAGS)
+
+# What each folder may lean on outside the tree.
+base_libs        := -ljansson -lpthread -lm
+files_libs       := -linih -lOpenEXRCore-3_1 -lpng $(base_libs)
+colorimetry_libs := -lm
+drivers_libs     := -lusb-1.0 -lmodbus -lhidapi-hidraw -ludev -lopencv_calib3d -lopencv_core -lstdc++ -lm
+simulator_libs   := $(shell pkg-config --libs umockdev-1.0) -lmodbus -lutil -lm -lpthread
+render_libs      := -lglfw -lepoxy -lEGL -lm
+config_libs      := -lm
+calibration_libs := -lceres -lglog -lmatio -lstdc++ -lm
+daemon_libs      := -lsystemd -lpthread -lm
+
+below = $(shell sed -n 's/^$(1): *//p' tests/layers.txt)
+archives = $(foreach f,$(1),$(BUILD)/$(f).a)
+libs = -Wl,--start-group $(call archives,$(1)) -Wl,--end-group -Wl,--as-needed $(foreach f,$(1),$($(f)_libs)) -fopenmp $(SANITIZE)
+
+MAINS    := $(foreach p,$(PROGRAMS),$($(p)_in)/$(p).c)
+SOURCES  := $(filter-out $(MAINS),$(foreach f,$(FOLDERS),$(wildcard $(f)/*.c $(f)/tables/*.c $(f)/*.cpp)))
+TESTS    := $(wildcard $(FOLDERS:%=tests/%/test_*.c) tests/whole/test_*.c)
+FAKES    := $(wildcard tests/fakes/*.c)
+SHADERS  := $(wildcard render/shaders/*.glsl colorimetry/*.glsl)
+object    = $(patsubst %,$(BUILD)/%.o,$(basename $(1)))
+
+.PHONY: all deps demo check check-here bench format layers links install uninstall clean
+.SECONDARY:
+
+all: $(PROGRAMS:%=$(BUILD)/%)
+
+deps:
+	tests/deps.sh $(PACKAGES)
+
+$(BUILD)/packages.ok: Makefile
+	@mkdir -p $(@D)
+	@for p in $(PKGS); do pkg-config --exists $$p || { echo "boothd: the library $$p is missing; run 'make deps' (as root) first" >&2; exit 1; }; done
+	@for h in opencv4/opencv2/calib3d.hpp ceres/ceres.h; do [ -e /usr/include/$$h ] || { echo "boothd: <$$h> is missing; run 'make deps' (as root) first" >&2; exit 1; }; done
+	@touch $@
+
+$(BUILD)/%.o: %.c | $(BUILD)/packages.ok
+	@mkdir -p $(@D)
+	$(CC) $(ALL_C) -MMD -MP -c $< -o $@
+
+$(BUILD)/%.o: %.cpp | $(BUILD)/packages.ok
+	@mkdir -p $(@D)
+	$(CXX) $(ALL_CXX) -MMD -MP -c $< -o $@
+
+# Shaders are files; this one rule embeds them as C strings.
+$(BUILD)/render/shaders_embedded.inc: $(SHADERS)
+	@mkdir -p $(@D)
+	for f in $^; do printf '{"%s",\n' $$(basename $$f); sed -e 's/\\/\\\\/g; s/"/\\"/g; s/^/"/; s/$$/\\n"/' $$f; echo '},'; done > $@
+
+define folder_rule
+$(BUILD)/$(1).a: $(call object,$(filter $(1)/%,$(SOURCES)))
+	@rm -f $$@
+	$(AR) rcs $$@ $$^
+$(BUILD)/tests/$(1)/%: $(BUILD)/tests/$(1)/%.o $(call object,$(FAKES)) $(call archives,$(1) $(call below,$(1)))
+	$(CC) -o $$@ $$< $(call object,$(FAKES)) $(call libs,$(1) $(call below,$(1))) -lcmocka
+$(BUILD)/links/$(1): $(BUILD)/$(1).a $(call archives,$(call below,$(1)))
+	@mkdir -p $$(@D)
+	$(CC) -shared -Wl,--no-undefined -o $$@ -Wl,--whole-archive $$< -Wl,--no-whole-archive $(call libs,$(1) $(call below,$(1)))
+endef
+$(foreach f,$(FOLDERS),$(eval $(call folder_rule,$(f))))
+
+define program_rule
+$(BUILD)/$(1): $(BUILD)/$($(1)_in)/$(1).o $(call archives,$($(1)_in) $(call below,$($(1)_in)))
+	$(CC) -o $$@ $$< $(call libs,$($(1)_in) $(call below,$($(1)_in)))
+endef
+$(foreach p,$(PROGRAMS),$(eval $(call program_rule,$(p))))
+
+$(BUILD)/tests/whole/%: $(BUILD)/tests/whole/%.o $(call object,$(FAKES)) $(call archives,base files colorimetry) all
+	$(CC) -o $@ $< $(call object,$(FAKES)) $(call libs,base files colorimetry) -lcmocka
+
+$(call object,render/gl.c): $(BUILD)/render/shaders_embedded.inc
+
+links: $(FOLDERS:%=$(BUILD)/links/%)
+
+layers:
+	tests/layers.sh
+
+check: layers links
+	$(MAKE) check-here
+	$(MAKE) BUILD=$(BUILD)/asan FLAVOUR=sanitize check-here
+	@tests/run.sh --total $(BUILD)/results $(BUILD)/asan/results
+
+check-here: all $(TESTS:%.c=$(BUILD)/%)
+	BUILD=$(BUILD) tests/run.sh $(BUILD)/results $(TESTS:%.c=$(BUILD)/%)
+
+demo:
+	@$(MAKE) -s deps
+	$(MAKE) all
+	BUILD=$(BUILD) calibration/demo.sh $(BUILD)/demo
+
+clean:
+	rm -rf build
+
+-include $(patsubst %,$(BUILD)/%.d,$(basename $(SOURCES) $(MAINS) $(TESTS) $(FAKES)))

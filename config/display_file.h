@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+// The fitted display model on disk (INI): boothcal writes it, boothd loads it.
+#ifndef CONFIG_DISPLAY_FILE_H
+#define CONFIG_DISPLAY_FILE_H
+
+#include "colorimetry/display.h"
+
+// What the fit was made from: stays with the model.
+struct display_origin {
+    char instrument[128], date[32], software[64], source[512]; // source: the .ti3
+    int patches;
+    double fit_mean_de00, fit_max_de00; // over the fitted patches
+};
+
+bool display_save(const char *path, const struct display_model *model,
+                  const struct display_origin *origin, struct error *err);
+
+// Loads and prepares. Refuses what display_model_prepare refuses, with file
+// and section. origin may be NULL.
+bool display_load(const char *path, struct display_model *model, struct display_origin *origin,
+                  struct error *err);
+
+#endif

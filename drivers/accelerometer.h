@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// From any inclinometer or accelerometer to the screen's tilt.
+#ifndef DRIVERS_ACCELEROMETER_H
+#define DRIVERS_ACCELEROMETER_H
+
+#include "base/linear.h"
+#include "drivers/spectrometer.h"
+
+struct tilt_sample {
+    struct interval taken;
+    struct vec3 gravity;  // m/s2 in the sensor's axes: z out of the screen, x right, y up along it
+    double tilt_deg;      // screen plane against horizontal: 0 lies flat face up, 90 upright; -180..180
+    double angle_deg;     // the same from the sensor's own angle registers, NAN when it has none
+    bool plausible;       // |gravity| within 9.81 +- 0.3 m/s2 and both tilts agree within 2 degrees
+};
+
+struct accelerometer_options {
+    char port[128];    // "/dev/ttyUSB0", or "host:port" for Modbus TCP
+    int unit;          // Modbus unit id 1..247
+    int baud;          // 1200..921600
+    int model;         // index into accelerometer_models
+    double offset_deg; // added to tilt, -180..180
+};
+
+extern const struct setting accelerometer_settings[];
+extern const char *const accelerometer_models[]; // "wt901c485", "hwt9073", NULL
+
+struct accelerometer;
+
+// As spectrometer_driver, each function alike.
+struct accelerometer_driver {
+    const char *name;
+    struct accelerometer *(*open)(const struct accelerometer_options *options, int64_t deadline_ns,
+                                  struct error *err);
+    bool (*read)(struct accelerometer *device, int64_t deadline_ns, struct tilt_sample *out,
+                 struct error *err);
+    void (*identify)(const struct accelerometer *device, struct instrument_identity *out);
+    void (*close)(struct accelerometer *device);
+};
+
+extern const struct accelerometer_driver *const accelerometer_drivers[];
+
+// Tilt from gravity in the sensor's axes by atan2 forms, right at +-90 degrees:
+// (0, 0, g) is 0, (0, g, 0) is 90. Source: Freescale AN3461 (2013), eq. 25-26.
+double tilt_of_gravity(struct vec3 gravity);
+
+#endif

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// From any spectroradiometer aimed at the screen to spectral radiance.
+#ifndef DRIVERS_RADIOMETER_H
+#define DRIVERS_RADIOMETER_H
+
+#include "colorimetry/colour.h"
+#include "drivers/spectrometer.h"
+
+struct radiance_sample {
+    struct interval taken;
+    struct xyz xyz;            // as the instrument computed it, 1931 2 degrees, cd/m2
+    double first_nm, step_nm;  // of raw
+    int count;                 // 0..401
+    double raw[401];           // W m-2 sr-1 nm-1 as sent
+    struct spectrum radiance;  // on the inner grid
+};
+
+struct radiometer_options {
+    char port[128]; // serial line, "" = none
+    int average;    // readings per sample, 1..99
+};
+
+extern const struct setting radiometer_settings[];
+
+struct radiometer;
+
+struct radiometer_driver {
+    const char *name; // "pr655"
+    struct radiometer *(*open)(const struct radiometer_options *options, int64_t deadline_ns,
+                               struct error *err);
+    // RETRY for weak or unstable light and time-outs; RANGE for overload; the
+    // text gives the instrument's own status number.
+    bool (*read)(struct radiometer *device, int64_t deadline_ns, struct radiance_sample *out,
+                 struct error *err);
+    void (*identify)(const struct radiometer *device, struct instrument_identity *out);
+    void (*close)(struct radiometer *device);
+};
+
+extern const struct radiometer_driver *const radiometer_drivers[];
+
+#endif

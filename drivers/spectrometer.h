@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+// From any spectrometer to one plain sample of spectral irradiance.
+#ifndef DRIVERS_SPECTROMETER_H
+#define DRIVERS_SPECTROMETER_H
+
+#include "base/clock.h"
+#include "base/settings.h"
+#include "colorimetry/spectrum.h"
+
+#define SPECTROMETER_STATUSES(X)                                                                   \
+    X(GOOD, "good")                                                                                \
+    X(SATURATED, "saturated") /* a used pixel reached saturation on raw counts */                  \
+    X(WEAK, "weak")           /* too few counts above dark for the longest exposure */             \
+    X(SETTLING, "settling")   /* exposure is being found */
+
+enum spectrometer_status {
+#define X(name, text) SPECTROMETER_##name,
+    SPECTROMETER_STATUSES(X)
+#undef X
+};
+
+const char *spectrometer_status_name(enum spectrometer_status status);
+
+struct spectrum_sample {
+    struct interval taken;      // the light fell on the detector within this interval
+    enum spectrometer_status status;
+    int integration_us;         // of this reading
+    int averaged;               // readings averaged, >= 1
+    double peak;                // largest raw count over saturation, 0..1
+    struct spectrum irradiance; // W m-2 nm-1 on the inner grid; 0 where the instrument does not reach
+    struct spectrum sigma;      // standard uncertainty of it (shot, read, dark), same unit
+};
+
+struct instrument_identity {
+    char model[64], serial[64], firmware[64];
+    bool emulated; // the instrument says of itself that it is emulated
+};
+
+struct spectrometer_options {
+    char serial[64];       // "" = the first one found
+    char calibration[512]; // file of uJ/count per nm; required for absolute readings
+    double collector_mm2;  // area of the cosine corrector, 0.01..10000
+    double mains_hz;       // 50 or 60: exposures are multiples of half its period
+    int integration_us;    // first exposure, 1000..65535000
+    int average;           // readings per sample, 1..100
+};
+
+extern const struct setting spectrometer_settings[];
+
+struct spectrometer; // one open instrument
+
+// One driver.
+struct spectrometer_driver {
+    const char *name; // "ocean"
+    // Opens by options->serial. NULL with GONE (not there), SYSTEM (permission:
+    // the text names the udev rule), DATA. Must return within deadline_ns.
+    struct spectrometer *(*open)(const struct spectrometer_options *options, int64_t deadline_ns,
+                                 struct error *err);
+    // One sample. RETRY: nothing good this time, call again; GONE: close and
+    // open again. Never blocks beyond deadline_ns (CLOCK_MONOTONIC).
+    bool (*read)(struct spectrometer *device, int64_t deadline_ns, struct spectrum_sample *out,
+                 struct error *err);
+    void (*identify)(const struct spectrometer *device, struct instrument_identity *out);
+    void (*close)(struct spectrometer *device); // accepts NULL
+};
+
+// NULL-terminated.
+extern const struct spectrometer_driver *const spectrometer_drivers[];
+
+#endif

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// CGATS text files, the form colour instruments speak: .ti3 (measured patches),
+// .sp (spectra), .cal. Source: ArgyllCMS documentation of its formats.
+#ifndef FILES_CGATS_H
+#define FILES_CGATS_H
+
+#include <stdio.h>
+
+#include "files/table.h"
+
+struct cgats_keyword {
+    char *name, *value;
+    int line;
+};
+
+// One table of a file. Non-numeric cells (SAMPLE_ID, SAMPLE_LOC, SAMPLE_NAME,
+// STRING) are NAN in table.values; SAMPLE_ID, else SAMPLE_NAME, is the label.
+struct cgats {
+    char identifier[32]; // "CTI3", "SPECT", "CGATS.17"
+    size_t keyword_count;
+    struct cgats_keyword *keywords;
+    struct table table;
+};
+
+void cgats_fini(struct cgats *file);
+
+// Reads the first table; later tables (a .ti3's CAL) are checked for form and
+// left out. Refuses, naming file, line, key and what was expected: an
+// identifier that is missing, NUMBER_OF_FIELDS or NUMBER_OF_SETS that
+// contradicts the data, a duplicate field, a cell that is no finite number.
+bool cgats_load(const char *path, struct cgats *file, struct error *err);
+
+// As cgats_load, requiring an identifier such as "CTI3".
+bool cgats_load_as(const char *path, const char *identifier, struct cgats *file, struct error *err);
+
+// Value of a keyword or NULL.
+const char *cgats_keyword(const struct cgats *file, const char *name);
+
+// A keyword as count finite numbers; error names file, line and key.
+bool cgats_numbers(const struct cgats *file, const char *name, double *values, size_t count,
+                   struct error *err);
+
+// Writes identifier, keywords (non-standard ones declared) and the table;
+// labels, if any, become SAMPLE_ID.
+bool cgats_save(const char *path, const struct cgats *file, struct error *err);
+
+#endif

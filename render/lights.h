@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// From a luminance image of the booth's ceiling to light points by median cut.
+#ifndef RENDER_LIGHTS_H
+#define RENDER_LIGHTS_H
+
+#include "base/error.h"
+#include "base/linear.h"
+#include "files/exr.h"
+
+// A horizontal rectangle that emits downwards.
+struct ceiling {
+    double centre_m[3]; // booth frame
+    double width_m;     // along x, 0.01..20
+    double depth_m;     // along z, 0.01..20
+};
+
+// Luminance in cd/m2, [height][width]; row 0 is the edge far from the observer
+// (least z), column 0 the left edge (least x).
+struct luminance_map {
+    struct ceiling ceiling;
+    int width, height; // 1..16384
+    double *luminance; // owned
+    long negative;     // pixels that were below zero (camera noise) and set to 0
+    double negative_mean; // their mean, cd/m2: the bias that clipping left
+};
+
+// From an EXR with channel "Y" (cd/m2). Size in metres from the attributes
+// boothd.width_m and boothd.depth_m when present (they must agree with
+// ceiling within 1 %), else from ceiling. Error DATA without "Y".
+bool luminance_map_load(const char *path, const struct ceiling *ceiling, struct luminance_map *map,
+                        struct error *err);
+void luminance_map_fini(struct luminance_map *map);
+
+// Mean luminance of the map in a disc about a booth point on the ceiling, cd/m2.
+double luminance_map_spot(const struct luminance_map *map, double x_m, double z_m,
+                          double diameter_m);
+
+void luminance_map_scale(struct luminance_map *map, double k);
+
+struct light_point {
+    struct vec3 at;      // booth frame, m
+    double intensity_cd; // towards straight down: (A/P) * sum of luminance
+};
+
+struct light_points {
+    int count;
+    struct light_point *points; // owned
+};
+
+enum median_cut { CUT_VARIANCE, CUT_ENERGY };
+
+// At most `most` points (1..4096), fewer when the map has fewer lit pixels; an
+// all-dark map gives none. Sums in double on coordinates centred on the image;
+// a dark or single-pixel region is never split; ties keep the lower index.
+// Sources: Debevec 2005 (equal energy); Viriyothai, Debevec 2009 (variance).
+bool median_cut(const struct luminance_map *map, enum median_cut how, int most,
+                struct light_points *out, struct error *err);
+void light_points_fini(struct light_points *lights);
+
+// Illuminance on a surface at p with unit normal n (booth frame), lux. Sum
+// over the points: I max(0, w.n) max(0, -w.down) / d^2 (see
+// shaders/diffuse.glsl). level scales every intensity.
+double light_points_illuminance(const struct light_points *lights, double level, struct vec3 p,
+                                struct vec3 n);
+
+// The same by dense integration over every pixel of the map: the reference.
+double luminance_map_illuminance(const struct luminance_map *map, struct vec3 p, struct vec3 n);
+
+#endif

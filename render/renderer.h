@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+// From scene to light: an OpenGL 3.3 core renderer on a GLFW window, or on
+// EGL without any display. One thread (the main thread).
+#ifndef RENDER_RENDERER_H
+#define RENDER_RENDERER_H
+
+#include "render/scene.h"
+
+struct renderer;
+
+struct renderer_options {
+    bool window;       // a GLFW window; else EGL surfaceless
+    bool fullscreen;   // on the monitor named below, else a plain undecorated window at 0, 0
+    char monitor[128]; // name of the monitor, "" = the first
+    int width, height; // of the window or of the off-screen image
+};
+
+// NULL with err (SYSTEM) when no context of OpenGL 3.3 can be had.
+struct renderer *renderer_create(const struct renderer_options *options, struct error *err);
+void renderer_destroy(struct renderer *renderer); // accepts NULL
+
+// GL_RENDERER, and whether it is a software rasteriser.
+const char *renderer_name(const struct renderer *renderer);
+
+// Draws the scene and presents it; when it returns true the frame has been
+// handed to the display (glFinish done). A scene equal to the last one is not
+// drawn again unless forced. *drawn may be NULL.
+bool renderer_show(struct renderer *renderer, const struct scene *scene, bool force, bool *drawn,
+                   struct error *err);
+
+// Window events; false when the user closed the window. Always true on EGL.
+bool renderer_events(struct renderer *renderer, double timeout_s);
+
+// The last frame: 8-bit counts, [height][width][3], row 0 on top, malloc'd.
+uint8_t *renderer_counts(struct renderer *renderer, struct error *err);
+
+// The last SURFACE frame before the display model: XYZ in cd/m2 of `emitted`,
+// [height][width][3], row 0 on top, malloc'd.
+float *renderer_xyz(struct renderer *renderer, struct error *err);
+
+// Share of pixels of the last SURFACE frame out of the display's gamut, 0..1.
+double renderer_out_of_gamut(struct renderer *renderer);
+
+#endif

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// What to show, complete: everything a renderer needs for one frame and
+// nothing it must ask for.
+#ifndef RENDER_SCENE_H
+#define RENDER_SCENE_H
+
+#include <stdint.h>
+
+#include "colorimetry/display.h"
+#include "render/lights.h"
+#include "render/stand.h"
+
+enum scene_kind {
+    SCENE_DARK,    // black, nothing to proof (no lamp)
+    SCENE_PATCH,   // uniform digital counts, never dithered
+    SCENE_SURFACE, // a material under the lamp
+};
+
+// Pointers are borrowed for the call. A generation number changes whenever
+// what it stands beside changes, so that a stage re-does its work only then.
+struct scene {
+    enum scene_kind kind;
+    struct counts patch; // PATCH
+
+    struct screen screen;
+    struct rigid booth_from_screen;
+    struct vec3 eye; // booth frame, m
+
+    const struct light_points *lights;
+    uint64_t lights_generation;
+    double level; // live level over taught level of the lamp, 0..10
+
+    const float *texels; // [height][width][3] relative XYZ, Y = 1 for the perfect diffuser
+    int texels_width, texels_height;
+    uint64_t texels_generation;
+    struct vec3 texel_offset; // x, y in 0..1 of the material shown at the screen's centre,
+    double texel_scale_x;     // metres of screen a full material width covers
+    double texel_scale_y;     // likewise its height
+
+    struct xyz white;          // relative XYZ of the perfect diffuser under the lamp, Y = 1
+    double screen_reflectance; // diffuse, 0..0.2 (0.002)
+
+    const struct display_model *display;
+    uint64_t display_generation;
+    int bits; // of the display's input, 8 or 10
+    bool dither;
+};
+
+// What a pixel should be, in double: see reference.h.
+struct pixel {
+    double illuminance;      // lux on the screen plane there
+    struct xyz surface;      // cd/m2 that the surface would send
+    struct xyz emitted;      // surface less the screen's own reflection
+    struct display_inverse inverse;
+};
+
+#endif
