@@ -25,7 +25,7 @@ OPTIMISE := -O2
 SANITIZE_sanitize := -fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer
 SANITIZE := $(SANITIZE_$(FLAVOUR))
 WARN     := -Wall -Wextra -Werror -Wshadow -Wvla -Wswitch-enum
-INCLUDES  = -I. -I$(BUILD) $(shell pkg-config --cflags $(PKGS)) -isystem /usr/include/opencv4 -isystem /usr/include/eigen3
+INCLUDES := -I. -I$(BUILD) $(shell pkg-config --cflags $(PKGS) 2>/dev/null) -isystem /usr/include/opencv4 -isystem /usr/include/eigen3
 ALL_C     = -std=c11 -D_GNU_SOURCE $(OPTIMISE) -g -fPIC -fopenmp $(WARN) -Wstrict-prototypes -Wmissing-prototypes \
             -DBOOTHD_VERSION='"$(VERSION)"' -DBOOTHD_DATADIR='"$(PREFIX)/share/boothd"' $(INCLUDES) $(SANITIZE) $(CFLAGS)
 ALL_CXX   = -std=c++17 -D_GNU_SOURCE $(OPTIMISE) -g -fPIC -fopenmp -Wall -Wextra -Werror $(INCLUDES) $(SANITIZE) $(CXXFLAGS)
@@ -35,7 +35,7 @@ base_libs        := -ljansson -lpthread -lm
 files_libs       := -linih -lOpenEXRCore-3_1 -lpng $(base_libs)
 colorimetry_libs := -lm
 drivers_libs     := -lusb-1.0 -lmodbus -lhidapi-hidraw -ludev -lopencv_calib3d -lopencv_core -lstdc++ -lm
-simulator_libs   := $(shell pkg-config --libs umockdev-1.0) -lmodbus -lutil -lm -lpthread
+simulator_libs   := $(shell pkg-config --libs umockdev-1.0 2>/dev/null) -lmodbus -lutil -lm -lpthread
 render_libs      := -lglfw -lepoxy -lEGL -lm
 config_libs      := -lm
 calibration_libs := -lceres -lglog -lmatio -lstdc++ -lm

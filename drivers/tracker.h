@@ -19,8 +19,9 @@ enum tracker_status {
 
 const char *tracker_status_name(enum tracker_status status);
 
-// Tracker frame: origin at the camera, x right as the camera sees it, y up, z
-// out of the lens towards what it looks at. Metres.
+// Tracker frame: origin at the camera, z out of the lens, y up, x = y cross z:
+// the axes of a camera that faces the observer are parallel to the booth's
+// (x to the observer's right). Metres.
 struct head_sample {
     struct interval taken;
     enum tracker_status status;
