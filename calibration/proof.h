@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// How far a set of patches is from its reference, as published and absolute.
+#ifndef CALIBRATION_PROOF_H
+#define CALIBRATION_PROOF_H
+
+#include "calibration/facts.h"
+
+// Fills de_* of every patch and lamp->proof. Needs reference, measured, full,
+// bands and in_gamut of every patch, white_reference and white_patch.
+//
+// As published (RIT light-booth display): each set is divided by 1.13 times
+// the Y of its own white patch, adapted by CAT02 (D = 1) from the lamp's
+// perfect diffuser to D65, CIELAB under D65, CIEDE2000.
+// Absolute: cd/m2, no division, no adaptation; the white of CIELAB is the
+// perfect diffuser at that place under that lamp.
+// Errors (DATA): a white that is not positive.
+bool proof_judge(struct lamp_facts *lamp, struct error *err);
+
+// One colour difference as published: both colours are already divided, Y = 1
+// for the perfect diffuser; white is the lamp's perfect diffuser.
+bool proof_published_difference(struct xyz a, struct xyz b, struct xyz white, double *de,
+                                struct error *err);
+
+// The published figures: rows "D65 lamp", "D50 lamp", "A lamp".
+struct published_row {
+    const char *lamp;
+    double simulation[4], screen[4]; // mean, std, 90th percentile, max
+    double in_gamut[4];              // zeros where none were published
+};
+extern const struct published_row published_table[3];
+
+#endif
