@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/bench.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "base/clock.h"
+
+static const int TIMEOUT_MS = 60000;
+
+static bool done(json_t *reply)
+{
+    json_decref(reply);
+    return reply;
+}
+
+static json_t *daemon_call(struct bench *b, json_t *request, struct error *err)
+{
+    return control_call(b->daemon, request, TIMEOUT_MS, err);
+}
+
+json_t *bench_status(struct bench *b, struct error *err)
+{
+    return daemon_call(b, json_pack("{ss}", "do", CONTROL_STATUS), err);
+}
+
+bool bench_patch(struct bench *b, struct counts c, struct error *err)
+{
+    return done(daemon_call(b, json_pack("{ss,s[fff]}", "do", CONTROL_PATCH, "rgb", c.r, c.g, c.b), err));
+}
+
+bool bench_show(struct bench *b, const char *material, const char *patch, struct error *err)
+{
+    json_t *request = json_pack("{ss,ss}", "do", CONTROL_SHOW, "material", material);
+    if (patch)
+        json_object_set_new(request, "patch", json_string(patch));
+    return done(daemon_call(b, request, err));
+}
+
+static bool take_xyz(const json_t *reply, const char *key, struct xyz *out, struct error *err)
+{
+    const json_t *v = json_object_get(reply, key);
+    if (json_array_size(v) != 3)
+        return fail(err, ERROR_DATA, "the reply has no %s", key);
+    *out = (struct xyz){json_number_value(json_array_get(v, 0)), json_number_value(json_array_get(v, 1)),
+                        json_number_value(json_array_get(v, 2))};
+    if (!isfinite(out->X + out->Y + out->Z))
+        return fail(err, ERROR_DATA, "%s is not finite", key);
+    return true;
+}
+
+bool bench_measure(struct bench *b, const char *what, struct xyz *xyz, int *index, struct error *err)
+{
+    json_t *reply = NULL;
+    for (int attempt = 0; attempt < 3 && !reply; attempt++) {
+        reply = daemon_call(b, json_pack("{ss,sf}", "do", CONTROL_MEASURE, "timeout_s", 50.0), err);
+        if (!reply && err->code != ERROR_RETRY)
+            break;
+    }
+    if (!reply)
+        return while_doing(err, "measuring %s", what);
+    if (!take_xyz(reply, "XYZ", xyz, err)) {
+        json_decref(reply);
+        return while_doing(err, "measuring %s", what);
+    }
+    json_object_del(reply, "ok");
+    json_object_set_new(reply, "what", json_string(what));
+    if (index)
+        *index = (int)json_array_size(b->readings);
+    json_array_append_new(b->readings, reply);
+    return true;
+}
+
+bool bench_in_gamut(struct bench *b, int x_px, int y_px, bool *in_gamut, struct error *err)
+{
+    json_t *reply =
+        daemon_call(b, json_pack("{ss,si,si}", "do", CONTROL_PROBE, "x_px", x_px, "y_px", y_px), err);
+    *in_gamut = json_is_true(json_object_get(reply, "in_gamut"));
+    return done(reply);
+}
+
+bool bench_capture(struct bench *b, const char *path, struct error *err)
+{
+    return done(daemon_call(b, json_pack("{ss,ss}", "do", CONTROL_CAPTURE, "file", path), err));
+}
+
+bool bench_reload(struct bench *b, struct error *err)
+{
+    return done(daemon_call(b, json_pack("{ss}", "do", CONTROL_RELOAD), err));
+}
+
+static bool take_spectrum(const json_t *reply, struct spectrum *out, struct error *err)
+{
+    const json_t *values = json_object_get(reply, "irradiance");
+    if (json_array_size(values) != SPECTRUM_COUNT)
+        return fail(err, ERROR_DATA, "the reply has no irradiance of %d values", SPECTRUM_COUNT);
+    for (size_t i = 0; i < SPECTRUM_COUNT; i++)
+        out->v[i] = json_number_value(json_array_get(values, i));
+    return true;
+}
+
+bool bench_teach(struct bench *b, const char *lamp, int readings, struct spectrum *irradiance,
+                 double *spread, double *lux, struct error *err)
+{
+    json_t *request = json_pack("{ss,ss,si}", "do", CONTROL_TEACH, "lamp", lamp, "readings", readings);
+    json_t *reply = daemon_call(b, request, err);
+    if (!reply || !take_spectrum(reply, irradiance, err)) {
+        json_decref(reply);
+        return while_doing(err, "teaching lamp %s", lamp);
+    }
+    *spread = json_number_value(json_object_get(reply, "spread"));
+    *lux = json_number_value(json_object_get(reply, "lux"));
+    json_object_del(reply, "ok");
+    json_object_set_new(reply, "what", json_sprintf("teach %s", lamp));
+    json_array_append_new(b->readings, reply);
+    return true;
+}
+
+static bool lamp_is(const json_t *status, const char *lamp)
+{
+    const json_t *belief = json_object_get(status, "lamp");
+    const char *verdict = json_string_value(json_object_get(belief, "verdict"));
+    const char *name = json_string_value(json_object_get(belief, "name"));
+    if (!verdict)
+        return false;
+    if (!*lamp)
+        return !strcmp(verdict, "none");
+    return !strcmp(verdict, "known") && name && !strcmp(name, lamp);
+}
+
+bool bench_await_lamp(struct bench *b, const char *lamp, double timeout_s, struct error *err)
+{
+    int64_t deadline = clock_now_ns() + (int64_t)(timeout_s * 1e9);
+    for (;;) {
+        json_t *status = bench_status(b, err);
+        if (!status)
+            return false;
+        bool there = lamp_is(status, lamp);
+        json_decref(status);
+        if (there)
+            return true;
+        if (clock_now_ns() > deadline)
+            return fail(err, ERROR_RETRY, "boothd did not recognise %s within %.0f s",
+                        *lamp ? lamp : "the dark booth", timeout_s);
+        clock_sleep_until_ns(clock_now_ns() + 50 * NS_PER_MS);
+    }
+}
+
+// Steals request.
+static bool by_hand(struct bench *b, json_t *request, struct error *err, const char *please)
+{
+    if (b->booth)
+        return done(control_call(b->booth, request, TIMEOUT_MS, err));
+    json_decref(request);
+    fprintf(stderr, "\n%s, then press Enter. ", please);
+    for (int c = getchar(); c != '\n'; c = getchar())
+        if (c == EOF)
+            return fail(err, ERROR_GONE, "nobody answered: %s", please);
+    return true;
+}
+
+bool bench_lamp(struct bench *b, const char *lamp, struct error *err)
+{
+    char please[128];
+    snprintf(please, sizeof please, "Switch the booth's lamp to: %s", lamp);
+    return by_hand(b, json_pack("{ss,ss}", "do", CONTROL_LAMP, "name", lamp), err, please);
+}
+
+bool bench_tilt(struct bench *b, double deg, struct error *err)
+{
+    char please[128];
+    snprintf(please, sizeof please, "Tilt the screen to %.0f degrees", deg);
+    return by_hand(b, json_pack("{ss,sf}", "do", CONTROL_TILT, "deg", deg), err, please);
+}
+
+bool bench_head(struct bench *b, struct vec3 eye, struct error *err)
+{
+    char please[128];
+    snprintf(please, sizeof please, "Bring your eyes to x %.2f, y %.2f, z %.2f m", eye.x, eye.y, eye.z);
+    return by_hand(b, json_pack("{ss,s[fff]}", "do", CONTROL_HEAD, "eye_m", eye.x, eye.y, eye.z), err,
+                   please);
+}
+
+bool bench_aim_screen(struct bench *b, double x_px, double y_px, struct error *err)
+{
+    char please[128];
+    snprintf(please, sizeof please, "Aim the radiometer at the screen, pixel %.0f, %.0f", x_px, y_px);
+    return by_hand(b,
+                   json_pack("{ss,ss,sf,sf}", "do", CONTROL_AIM, "target", "screen", "x_px", x_px,
+                             "y_px", y_px),
+                   err, please);
+}
+
+bool bench_aim_ceiling(struct bench *b, double x_m, double z_m, struct error *err)
+{
+    char please[128];
+    snprintf(please, sizeof please, "Aim the radiometer at the ceiling, x %.3f m, z %.3f m", x_m, z_m);
+    return by_hand(b,
+                   json_pack("{ss,ss,sf,sf}", "do", CONTROL_AIM, "target", "ceiling", "x_m", x_m,
+                             "z_m", z_m),
+                   err, please);
+}
+
+static json_t *sample_of(const struct spectrum *reflectance)
+{
+    json_t *nm = json_array(), *values = json_array();
+    for (int i = 0; i < SPECTRUM_COUNT; i++) {
+        json_array_append_new(nm, json_integer(SPECTRUM_FIRST_NM + i));
+        json_array_append_new(values, json_real(reflectance->v[i]));
+    }
+    return json_pack("{so,so}", "nm", nm, "values", values);
+}
+
+bool bench_truth(struct bench *b, const struct spectrum *reflectances, int count, struct xyz *out,
+                 struct error *err)
+{
+    for (int i = 0; i < count; i++) {
+        json_t *request = json_pack("{ss,so}", "do", CONTROL_TRUTH, "reflectance",
+                                    sample_of(&reflectances[i]));
+        json_t *reply = control_call(b->booth, request, TIMEOUT_MS, err);
+        if (!reply || !take_xyz(reply, "XYZ", &out[i], err)) {
+            json_decref(reply);
+            return while_doing(err, "asking the emulated booth for a physical sample");
+        }
+        json_decref(reply);
+    }
+    return true;
+}
+
+void bench_progress(const struct bench *b, const char *step, int at, int all)
+{
+    if (b->terminal)
+        fprintf(stderr, "\r\033[K%s: %d of %d%s", step, at, all, at == all ? "\n" : "");
+}

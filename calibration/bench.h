@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+// The technician's bench: boothd for showing and reading, and whoever turns
+// the knobs of the booth: the emulated booth, or a person who is asked.
+#ifndef CALIBRATION_BENCH_H
+#define CALIBRATION_BENCH_H
+
+#include "base/control.h"
+#include "base/linear.h"
+#include "colorimetry/colour.h"
+#include "colorimetry/display.h"
+
+struct bench {
+    struct control_client *daemon;
+    struct control_client *booth; // NULL: a person turns the knobs
+    json_t *readings;             // every reading is appended as it came
+    bool terminal;                // progress is shown
+};
+
+// ---- boothd ----------------------------------------------------------------
+
+// The daemon's status, a new reference; NULL on failure.
+json_t *bench_status(struct bench *b, struct error *err);
+
+// Shows uniform counts, undithered.
+bool bench_patch(struct bench *b, struct counts counts, struct error *err);
+
+// Shows a material, or one patch of it over the whole screen when patch is not NULL.
+bool bench_show(struct bench *b, const char *material, const char *patch, struct error *err);
+
+// One reading of the radiometer: cd/m2. what names it among the readings;
+// *index (may be NULL) receives its number there. RETRY is tried three times.
+bool bench_measure(struct bench *b, const char *what, struct xyz *xyz, int *index,
+                   struct error *err);
+
+// Whether the display reaches what it should show at the screen's centre.
+bool bench_in_gamut(struct bench *b, int x_px, int y_px, bool *in_gamut, struct error *err);
+
+bool bench_capture(struct bench *b, const char *path, struct error *err);
+bool bench_reload(struct bench *b, struct error *err);
+
+// Averaged spectrum (W m-2 nm-1) of the lamp now on, from `readings` fresh
+// ones, with its relative spread and illuminance in lux.
+bool bench_teach(struct bench *b, const char *lamp, int readings, struct spectrum *irradiance,
+                 double *spread, double *lux, struct error *err);
+
+// Waits until the daemon is sure of lamp ("" = dark), at most timeout_s.
+bool bench_await_lamp(struct bench *b, const char *lamp, double timeout_s, struct error *err);
+
+// ---- the booth -------------------------------------------------------------
+
+bool bench_lamp(struct bench *b, const char *lamp, struct error *err); // "none" = off
+bool bench_tilt(struct bench *b, double deg, struct error *err);
+bool bench_head(struct bench *b, struct vec3 eye, struct error *err);
+bool bench_aim_screen(struct bench *b, double x_px, double y_px, struct error *err);
+bool bench_aim_ceiling(struct bench *b, double x_m, double z_m, struct error *err);
+
+// Absolute XYZ (cd/m2) that physical samples of those reflectances would send
+// from the aimed place. Emulated booth only.
+bool bench_truth(struct bench *b, const struct spectrum *reflectances, int count, struct xyz *out,
+                 struct error *err);
+
+// Shows "step: done of all" on a terminal.
+void bench_progress(const struct bench *b, const char *step, int done, int all);
+
+#endif
