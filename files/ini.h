@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Settings files in INI form (as systemd writes them), read with libinih into
-// the tables of base/settings.h.
+// the tables of base/settings.h. A comment is a line that begins with # or ;
+// (none after a value); blanks before a key mean nothing; a line holds at most
+// 65000 bytes.
 #ifndef FILES_INI_H
 #define FILES_INI_H
 
@@ -14,7 +16,9 @@
 // that is missing, bytes that are not text. Targets are undefined on failure.
 bool ini_load(const char *path, const struct settings_section *sections, struct error *err);
 
-// Writes all sections, each with every key, by write-fsync-rename.
+// Writes all sections, each with every key, by write-fsync-rename. Refuses
+// (CONFIG) a value that ini_load would not take back: outside its range, or
+// text with line ends or with blanks at its ends.
 bool ini_save(const char *path, const struct settings_section *sections, struct error *err);
 
 #endif
