@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "base/settings.h"
 
-#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -26,25 +25,25 @@ void settings_preset(const struct setting *rows, void *target)
             settings_set(rows, target, rows->name, rows->preset, NULL);
 }
 
-static bool outside(const struct setting *row, const char *text, struct error *err)
+static bool refuse(const struct setting *row, const char *text, int size, const char *why,
+                   struct error *err)
 {
-    return fail(err, ERROR_CONFIG, "%s: %s is outside %.15g..%.15g%s%s", row->name, text, row->least,
-                row->most, *row->unit ? " " : "", row->unit);
+    return fail(err, ERROR_CONFIG, "%s: \"%.*s\" %s; allowed: %.15g..%.15g%s%s", row->name,
+                size > 80 ? 80 : size, text, why, row->least, row->most, *row->unit ? " " : "",
+                row->unit);
 }
 
 static bool number(const struct setting *row, const char **text, double *value, struct error *err)
 {
     char *end;
-    errno = 0;
     *value = strtod(*text, &end);
-    if (end == *text || !isfinite(*value))
-        return fail(err, ERROR_CONFIG, "%s: \"%s\" is not a number%s%s", row->name, *text,
-                    *row->unit ? " in " : "", row->unit);
-    if (*value < row->least || *value > row->most) {
-        char shown[64];
-        snprintf(shown, sizeof shown, "%.*s", (int)(end - *text), *text);
-        return outside(row, shown, err);
-    }
+    bool apart = !*end || *end == ' ' || *end == '\t';
+    if (end == *text || !isfinite(*value) || !apart)
+        return refuse(row, *text, (int)strlen(*text), "is not a number", err);
+    if (*value < row->least || *value > row->most)
+        return fail(err, ERROR_CONFIG, "%s: %.*s is outside %.15g..%.15g%s%s", row->name,
+                    (int)(end - *text), *text, row->least, row->most, *row->unit ? " " : "",
+                    row->unit);
     *text = end + strspn(end, " \t");
     return true;
 }
@@ -56,7 +55,7 @@ static bool whole(const struct setting *row, const char *text, int *value, struc
     if (!number(row, &rest, &x, err))
         return false;
     if (*rest || x != rint(x))
-        return fail(err, ERROR_CONFIG, "%s: \"%s\" is not a whole number", row->name, text);
+        return refuse(row, text, (int)strlen(text), "is not a whole number", err);
     *value = (int)x;
     return true;
 }
@@ -72,20 +71,26 @@ static bool choice(const struct setting *row, const char *text, int *value, stru
         size_t used = strlen(list);
         snprintf(list + used, sizeof list - used, "%s%s", i ? ", " : "", row->choices[i]);
     }
-    return fail(err, ERROR_CONFIG, "%s: \"%s\" is not one of: %s", row->name, text, list);
+    return fail(err, ERROR_CONFIG, "%s: \"%.80s\" is not one of: %s", row->name, text, list);
 }
 
+// Looked through first, so that a bad element leaves all as they were.
 static bool vector(const struct setting *row, const char *text, double *values, struct error *err)
 {
-    double parsed[16] = {0};
     const char *rest = text;
-    for (size_t i = 0; i < row->size; i++)
-        if (!number(row, &rest, &parsed[i], err))
+    double x;
+    for (size_t i = 0; i < row->size; i++) {
+        if (!*rest)
+            return fail(err, ERROR_CONFIG, "%s: \"%.80s\" has %zu numbers instead of %zu", row->name,
+                        text, i, row->size);
+        if (!number(row, &rest, &x, err))
             return false;
+    }
     if (*rest)
-        return fail(err, ERROR_CONFIG, "%s: \"%s\" has more than %zu numbers", row->name, text,
-                    row->size);
-    memcpy(values, parsed, row->size * sizeof *values);
+        return fail(err, ERROR_CONFIG, "%s: \"%.80s\" is not %zu numbers with blanks between",
+                    row->name, text, row->size);
+    for (size_t i = 0; i < row->size; i++)
+        number(row, &text, &values[i], NULL);
     return true;
 }
 
@@ -104,7 +109,7 @@ bool settings_set(const struct setting *rows, void *target, const char *name, co
         if (!number(row, &rest, &x, err))
             return false;
         if (*rest)
-            return fail(err, ERROR_CONFIG, "%s: \"%s\" is not one number", name, text);
+            return refuse(row, text, (int)strlen(text), "is not one number", err);
         *(double *)field = x;
         return true;
     case SETTING_INT:
@@ -171,12 +176,24 @@ void settings_describe(const struct settings_section *section, FILE *out)
     }
 }
 
+static void write_row(const struct setting *row, const void *target, FILE *out)
+{
+    struct setting element = *row;
+    char text[1024];
+    size_t count = row->type == SETTING_VECTOR ? row->size : 1;
+    element.type = row->type == SETTING_VECTOR ? SETTING_DOUBLE : row->type;
+    fprintf(out, "%s =", row->name);
+    for (size_t i = 0; i < count; i++) {
+        settings_get(&element, target, text, sizeof text);
+        fprintf(out, " %s", text);
+        element.offset += sizeof(double);
+    }
+    fputc('\n', out);
+}
+
 void settings_write(const struct settings_section *section, FILE *out)
 {
     fprintf(out, "[%s]\n", section->name);
-    for (const struct setting *row = section->rows; row->name; row++) {
-        char text[1024];
-        settings_get(row, section->target, text, sizeof text);
-        fprintf(out, "%s = %s\n", row->name, text);
-    }
+    for (const struct setting *row = section->rows; row->name; row++)
+        write_row(row, section->target, out);
 }

@@ -1,0 +1,504 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "base/control.h"
+
+#include <errno.h>
+#include <poll.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include "base/clock.h"
+
+enum { LINE_MOST = 1 << 20, REPLY_MOST = 1 << 26, CHUNK = 1 << 16, CLIENTS_MOST = 16, REST_MS = 100 };
+
+// Bytes waiting to be parsed or sent.
+struct bytes {
+    char *text;
+    size_t used, room;
+};
+
+static bool bytes_reserve(struct bytes *b, size_t more)
+{
+    if (b->used + more <= b->room)
+        return true;
+    size_t room = 2 * b->room > b->used + more ? 2 * b->room : b->used + more;
+    char *text = realloc(b->text, room);
+    if (!text)
+        return false;
+    b->text = text;
+    b->room = room;
+    return true;
+}
+
+static void bytes_drop(struct bytes *b, size_t count)
+{
+    memmove(b->text, b->text + count, b->used - count);
+    b->used -= count;
+    if (b->used || b->room <= CHUNK)
+        return;
+    free(b->text);
+    *b = (struct bytes){0};
+}
+
+static bool address_of(const char *path, struct sockaddr_un *address, struct error *err)
+{
+    *address = (struct sockaddr_un){.sun_family = AF_UNIX};
+    if (!*path || strlen(path) >= sizeof address->sun_path)
+        return fail(err, ERROR_RANGE, "%s: a socket path must have 1..%zu bytes", path,
+                    sizeof address->sun_path - 1);
+    strcpy(address->sun_path, path);
+    return true;
+}
+
+// Error texts may quote a peer's bytes; JSON takes UTF-8 only.
+static json_t *json_text(const char *text)
+{
+    json_t *string = json_string(text);
+    if (string)
+        return string;
+    char plain[sizeof((struct error *)0)->text];
+    size_t i = 0;
+    for (; text[i] && i < sizeof plain - 1; i++)
+        plain[i] = text[i] >= ' ' && text[i] <= '~' ? text[i] : '?';
+    plain[i] = 0;
+    return json_string(plain);
+}
+
+// The client's side.
+
+struct control_client {
+    int fd;
+    bool broken;     // half a request went out
+    unsigned unread; // replies to calls that timed out, still to come
+    struct bytes in;
+    char path[sizeof((struct sockaddr_un *)0)->sun_path];
+};
+
+// connect() waits while the server's queue is full; this bounds it.
+static const struct timeval CONNECT_PATIENCE = {.tv_sec = 5};
+
+static bool open_client(struct control_client *client, const struct sockaddr_un *address,
+                        struct error *err)
+{
+    client->fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    if (client->fd < 0)
+        return fail_errno(err, "%s: no socket", client->path);
+    setsockopt(client->fd, SOL_SOCKET, SO_SNDTIMEO, &CONNECT_PATIENCE, sizeof CONNECT_PATIENCE);
+    if (!connect(client->fd, (const struct sockaddr *)address, sizeof *address))
+        return true;
+    if (errno == ENOENT || errno == ECONNREFUSED)
+        return fail(err, ERROR_GONE, "%s: nobody listens there", client->path);
+    if (errno == EAGAIN)
+        return fail(err, ERROR_RETRY, "%s: too many callers", client->path);
+    return fail_errno(err, "%s: cannot connect", client->path);
+}
+
+struct control_client *control_connect(const char *path, struct error *err)
+{
+    struct sockaddr_un address;
+    if (!address_of(path, &address, err))
+        return NULL;
+    struct control_client *client = calloc(1, sizeof *client);
+    if (!client) {
+        fail_errno(err, "%s", path);
+        return NULL;
+    }
+    strcpy(client->path, path);
+    if (open_client(client, &address, err))
+        return client;
+    control_close(client);
+    return NULL;
+}
+
+void control_close(struct control_client *client)
+{
+    if (!client)
+        return;
+    if (client->fd >= 0)
+        close(client->fd);
+    free(client->in.text);
+    free(client);
+}
+
+static bool wait_for(struct control_client *client, short events, int64_t deadline_ns,
+                     struct error *err)
+{
+    for (;;) {
+        int64_t left_ns = deadline_ns - clock_now_ns();
+        struct pollfd p = {client->fd, events, 0};
+        int ready = poll(&p, 1, left_ns > 0 ? (int)(left_ns / NS_PER_MS) + 1 : 0);
+        if (ready > 0)
+            return true;
+        if (!ready)
+            return fail(err, ERROR_RETRY, "%s: no answer in time", client->path);
+        if (errno != EINTR)
+            return fail_errno(err, "%s: cannot wait", client->path);
+    }
+}
+
+static bool send_line(struct control_client *client, const char *line, size_t size,
+                      int64_t deadline_ns, struct error *err)
+{
+    for (size_t sent = 0; sent < size;) {
+        ssize_t n = send(client->fd, line + sent, size - sent, MSG_NOSIGNAL | MSG_DONTWAIT);
+        if (n > 0) {
+            sent += n;
+        } else if (errno == EAGAIN || errno == EWOULDBLOCK) {
+            if (wait_for(client, POLLOUT, deadline_ns, err))
+                continue;
+            client->broken = sent;
+            return false;
+        } else if (errno != EINTR) {
+            client->broken = true; // but its last words may be there to read
+            return true;
+        }
+    }
+    return true;
+}
+
+static bool receive(struct control_client *client, struct error *err)
+{
+    if (client->in.used > REPLY_MOST || !bytes_reserve(&client->in, CHUNK)) {
+        client->broken = true;
+        return fail(err, ERROR_DATA, "%s: an answer is longer than %d bytes", client->path,
+                    REPLY_MOST);
+    }
+    ssize_t n = recv(client->fd, client->in.text + client->in.used, CHUNK, MSG_DONTWAIT);
+    if (n > 0)
+        client->in.used += n;
+    else if (!n || (errno != EAGAIN && errno != EINTR))
+        return fail(err, ERROR_GONE, "%s: the connection was closed", client->path);
+    return true;
+}
+
+// Waits until a whole line is in; *size without its end.
+static bool receive_line(struct control_client *client, size_t *size, int64_t deadline_ns,
+                         struct error *err)
+{
+    size_t looked = 0;
+    for (;;) {
+        char *end = looked < client->in.used
+                        ? memchr(client->in.text + looked, '\n', client->in.used - looked)
+                        : NULL;
+        if (end) {
+            *size = end - client->in.text;
+            return true;
+        }
+        looked = client->in.used;
+        if (!wait_for(client, POLLIN, deadline_ns, err) || !receive(client, err))
+            return false;
+    }
+}
+
+static enum error_code code_of(const char *name)
+{
+#define X(code, text)                                                                              \
+    if (name && !strcmp(name, text))                                                               \
+        return ERROR_##code;
+    ERROR_CODES(X)
+#undef X
+    return ERROR_DATA;
+}
+
+static json_t *take_reply(struct control_client *client, size_t size, struct error *err)
+{
+    json_t *reply = json_loadb(client->in.text, size, 0, NULL);
+    bytes_drop(&client->in, size + 1);
+    json_t *ok = json_object_get(reply, "ok");
+    if (json_is_true(ok))
+        return reply;
+    const char *text = json_string_value(json_object_get(reply, "error"));
+    if (json_is_false(ok) && text)
+        fail(err, code_of(json_string_value(json_object_get(reply, "code"))), "%s", text);
+    else
+        fail(err, ERROR_DATA, "%s: the answer is not a reply", client->path);
+    json_decref(reply);
+    return NULL;
+}
+
+static bool send_request(struct control_client *client, json_t *request, int64_t deadline_ns,
+                         struct error *err)
+{
+    char *text = request ? json_dumps(request, JSON_COMPACT) : NULL;
+    json_decref(request);
+    if (!text)
+        return fail(err, ERROR_RANGE, "%s: the request is not valid JSON", client->path);
+    size_t size = strlen(text);
+    text[size] = '\n';
+    bool ok = send_line(client, text, size + 1, deadline_ns, err);
+    free(text);
+    return ok;
+}
+
+json_t *control_call(struct control_client *client, json_t *request, int timeout_ms,
+                     struct error *err)
+{
+    int64_t deadline_ns = clock_now_ns() + timeout_ms * NS_PER_MS;
+    if (client->broken) {
+        json_decref(request);
+        fail(err, ERROR_GONE, "%s: the connection was lost", client->path);
+        return NULL;
+    }
+    if (!send_request(client, request, deadline_ns, err))
+        return NULL;
+    client->unread++;
+    for (;;) {
+        size_t size;
+        if (!receive_line(client, &size, deadline_ns, err))
+            return NULL;
+        if (!--client->unread)
+            return take_reply(client, size, err);
+        bytes_drop(&client->in, size + 1);
+    }
+}
+
+// The server's side. At most one reply waits per client; while it does, the
+// client's further lines wait too, so that one who never reads costs nothing.
+
+struct caller {
+    int fd; // -1 = free
+    bool ended;
+    struct bytes in, out;
+};
+
+struct control_server {
+    int fd;
+    bool resting; // accept failed: leave the queue alone for one round
+    struct sockaddr_un address;
+    dev_t device;
+    ino_t inode;
+    struct caller callers[CLIENTS_MOST];
+};
+
+static void hang_up(struct caller *caller)
+{
+    if (caller->fd >= 0)
+        close(caller->fd);
+    free(caller->in.text);
+    free(caller->out.text);
+    *caller = (struct caller){.fd = -1};
+}
+
+static bool clear_stale(const struct sockaddr_un *address, struct error *err)
+{
+    const char *path = address->sun_path;
+    struct stat there;
+    if (lstat(path, &there))
+        return errno == ENOENT || fail_errno(err, "%s", path);
+    if (!S_ISSOCK(there.st_mode))
+        return fail(err, ERROR_CONFIG, "%s: is there and is no socket", path);
+    int probe = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    bool stale = connect(probe, (const struct sockaddr *)address, sizeof *address) &&
+                 errno == ECONNREFUSED;
+    close(probe);
+    if (!stale)
+        return fail(err, ERROR_CONFIG, "%s: somebody already listens there", path);
+    return !unlink(path) || fail_errno(err, "%s: cannot be replaced", path);
+}
+
+static bool open_server(struct control_server *server, struct error *err)
+{
+    const char *path = server->address.sun_path;
+    if (!clear_stale(&server->address, err))
+        return false;
+    server->fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    // Linux creates the socket file with the mode of the socket itself, so
+    // nobody else can connect at any moment.
+    if (server->fd < 0 || fchmod(server->fd, 0600) ||
+        bind(server->fd, (struct sockaddr *)&server->address, sizeof server->address))
+        return fail_errno(err, "%s: cannot listen", path);
+    struct stat there;
+    if (listen(server->fd, CLIENTS_MOST) || stat(path, &there))
+        return fail_errno(err, "%s: cannot listen", path);
+    server->device = there.st_dev;
+    server->inode = there.st_ino;
+    return true;
+}
+
+struct control_server *control_listen(const char *path, struct error *err)
+{
+    struct sockaddr_un address;
+    if (!address_of(path, &address, err))
+        return NULL;
+    struct control_server *server = calloc(1, sizeof *server);
+    if (!server) {
+        fail_errno(err, "%s", path);
+        return NULL;
+    }
+    *server = (struct control_server){.fd = -1, .address = address};
+    for (int i = 0; i < CLIENTS_MOST; i++)
+        server->callers[i].fd = -1;
+    if (open_server(server, err))
+        return server;
+    control_unlisten(server);
+    return NULL;
+}
+
+void control_unlisten(struct control_server *server)
+{
+    if (!server)
+        return;
+    for (int i = 0; i < CLIENTS_MOST; i++)
+        hang_up(&server->callers[i]);
+    struct stat there;
+    if (server->inode && !lstat(server->address.sun_path, &there) &&
+        there.st_dev == server->device && there.st_ino == server->inode)
+        unlink(server->address.sun_path);
+    if (server->fd >= 0)
+        close(server->fd);
+    free(server);
+}
+
+static json_t *refusal(const struct error *err)
+{
+    bool filled = err->code != ERROR_NONE;
+    return json_pack("{s:b, s:s, s:o}", "ok", 0, "code",
+                     error_code_name(filled ? err->code : ERROR_SYSTEM), "error",
+                     json_text(filled ? err->text : "no answer"));
+}
+
+static json_t *answer(const char *line, size_t size, control_handler *handle, void *context)
+{
+    struct error err = {0};
+    json_error_t fault;
+    json_t *request = json_loadb(line, size, JSON_REJECT_DUPLICATES, &fault), *reply = NULL;
+    const char *what = json_string_value(json_object_get(request, "do"));
+    if (!request)
+        fail(&err, ERROR_DATA, "not JSON: %s", fault.text);
+    else if (!what)
+        fail(&err, ERROR_DATA, "a request must be an object with a text \"do\"");
+    else
+        reply = handle(context, what, request, &err);
+    json_decref(request);
+    if (reply && !json_object_set_new(reply, "ok", json_true()))
+        return reply;
+    json_decref(reply);
+    return refusal(&err);
+}
+
+static bool queue_reply(struct caller *caller, json_t *reply)
+{
+    char *text = reply ? json_dumps(reply, JSON_COMPACT) : NULL;
+    json_decref(reply);
+    size_t size = text ? strlen(text) : 0;
+    bool ok = text && bytes_reserve(&caller->out, size + 1);
+    if (ok) {
+        memcpy(caller->out.text + caller->out.used, text, size);
+        caller->out.text[caller->out.used + size] = '\n';
+        caller->out.used += size + 1;
+    }
+    free(text);
+    return ok;
+}
+
+// False when the peer is gone.
+static bool flush(struct caller *caller)
+{
+    size_t sent = 0;
+    bool ok = true;
+    while (ok && sent < caller->out.used) {
+        ssize_t n = send(caller->fd, caller->out.text + sent, caller->out.used - sent,
+                         MSG_NOSIGNAL | MSG_DONTWAIT);
+        if (n > 0)
+            sent += n;
+        else if (errno == EAGAIN || errno == EWOULDBLOCK)
+            break;
+        else
+            ok = errno == EINTR;
+    }
+    if (sent)
+        bytes_drop(&caller->out, sent);
+    return ok;
+}
+
+static bool read_more(struct caller *caller)
+{
+    if (!bytes_reserve(&caller->in, CHUNK))
+        return false;
+    ssize_t n = recv(caller->fd, caller->in.text + caller->in.used, CHUNK, MSG_DONTWAIT);
+    if (n > 0)
+        caller->in.used += n;
+    caller->ended = !n;
+    return n >= 0 || errno == EAGAIN || errno == EINTR;
+}
+
+// Answers lines until one reply has to wait. False to hang up.
+static bool answer_lines(struct caller *caller, control_handler *handle, void *context)
+{
+    size_t done = 0;
+    bool ok = flush(caller);
+    while (ok && !caller->out.used && done < caller->in.used) {
+        char *line = caller->in.text + done;
+        char *end = memchr(line, '\n', caller->in.used - done);
+        size_t size = end ? (size_t)(end - line) : caller->in.used - done;
+        if (size > LINE_MOST)
+            ok = false;
+        if (!end || !ok)
+            break;
+        ok = queue_reply(caller, answer(line, size, handle, context)) && flush(caller);
+        done += size + 1;
+    }
+    if (done)
+        bytes_drop(&caller->in, done);
+    return ok && !(caller->ended && !caller->out.used);
+}
+
+static void turn_away(int fd)
+{
+    static const char BUSY[] = "{\"ok\":false,\"code\":\"retry\",\"error\":\"too many clients\"}\n";
+    send(fd, BUSY, sizeof BUSY - 1, MSG_NOSIGNAL | MSG_DONTWAIT);
+    close(fd);
+}
+
+static void accept_callers(struct control_server *server)
+{
+    for (int tries = 0; tries < 2 * CLIENTS_MOST; tries++) {
+        int fd = accept4(server->fd, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
+        if (fd < 0) {
+            server->resting = errno != EAGAIN && errno != EINTR && errno != ECONNABORTED;
+            return;
+        }
+        int i = 0;
+        while (i < CLIENTS_MOST && server->callers[i].fd >= 0)
+            i++;
+        if (i < CLIENTS_MOST)
+            server->callers[i].fd = fd;
+        else
+            turn_away(fd);
+    }
+}
+
+static void serve_caller(struct caller *caller, short events, control_handler *handle,
+                         void *context)
+{
+    bool ok = !(events & (POLLERR | POLLNVAL));
+    if (ok && !caller->out.used && events & (POLLIN | POLLHUP))
+        ok = read_more(caller);
+    if (!ok || !answer_lines(caller, handle, context))
+        hang_up(caller);
+}
+
+bool control_serve(struct control_server *server, int timeout_ms, control_handler *handle,
+                   void *context, struct error *err)
+{
+    struct pollfd polled[CLIENTS_MOST + 1];
+    for (int i = 0; i < CLIENTS_MOST; i++) {
+        const struct caller *caller = &server->callers[i];
+        polled[i] = (struct pollfd){caller->fd, caller->out.used ? POLLOUT : POLLIN, 0};
+    }
+    polled[CLIENTS_MOST] = (struct pollfd){server->resting ? -1 : server->fd, POLLIN, 0};
+    bool short_wait = server->resting && (timeout_ms < 0 || timeout_ms > REST_MS);
+    server->resting = false;
+    int ready = poll(polled, CLIENTS_MOST + 1, short_wait ? REST_MS : timeout_ms);
+    if (ready < 0)
+        return errno == EINTR || fail_errno(err, "%s: cannot wait", server->address.sun_path);
+    for (int i = 0; i < CLIENTS_MOST; i++)
+        if (polled[i].revents)
+            serve_caller(&server->callers[i], polled[i].revents, handle, context);
+    if (polled[CLIENTS_MOST].revents)
+        accept_callers(server);
+    return true;
+}
