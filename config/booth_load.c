@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <math.h>
+#include <string.h>
+
+#include "config/booth.h"
+#include "config/paths.h"
+#include "files/ini.h"
+
+void booth_preset(struct booth_settings *booth)
+{
+    struct booth_tables tables;
+    *booth = (struct booth_settings){0};
+    booth_tables_init(&tables, booth);
+    for (struct settings_section *s = tables.sections; s->name; s++)
+        settings_preset(s->rows, booth);
+}
+
+// The paths among the settings, so that each is resolved in one place.
+struct path_field {
+    const char *section, *key;
+    char *text;
+    size_t size;
+};
+
+enum { PATH_FIELDS = 8 };
+
+static void path_fields(struct booth_settings *b, struct path_field out[PATH_FIELDS])
+{
+    const struct path_field fields[PATH_FIELDS] = {
+#define FIELD(section, key, field) {section, key, field, sizeof field}
+        FIELD("spectrometer", "calibration", b->spectrometer.options.calibration),
+        FIELD("accelerometer", "port", b->accelerometer.options.port),
+        FIELD("radiometer", "port", b->radiometer.options.port),
+        FIELD("display", "model", b->display.model),
+        FIELD("lamps", "folder", b->lamps.folder),
+        FIELD("materials", "folder", b->materials.folder),
+        FIELD("materials", "show", b->materials.show),
+        FIELD("control", "socket", b->control.socket),
+#undef FIELD
+    };
+    memcpy(out, fields, sizeof fields);
+}
+
+// "host:port" is no path, nor is a material's bare name.
+static bool names_no_path(const struct path_field *field)
+{
+    if (!strcmp(field->section, "accelerometer"))
+        return strchr(field->text, ':') && *field->text != '/';
+    return !strcmp(field->key, "show") && !strchr(field->text, '/');
+}
+
+static bool resolve(struct booth_settings *booth, const char *file, const char *section,
+                    const char *key, struct error *err)
+{
+    struct path_field fields[PATH_FIELDS];
+    path_fields(booth, fields);
+    for (int i = 0; i < PATH_FIELDS; i++) {
+        struct path_field *f = &fields[i];
+        if ((section && (strcmp(section, f->section) || strcmp(key, f->key))) || names_no_path(f))
+            continue;
+        if (!path_beside(file, f->text, f->text, f->size, err) ||
+            (*f->text && !path_absolute(f->text, f->text, f->size, err)))
+            return while_doing(err, "[%s] %s", f->section, f->key);
+    }
+    return true;
+}
+
+static struct settings_section *section_of(struct booth_tables *tables, const char *name)
+{
+    for (struct settings_section *s = tables->sections; s->name; s++)
+        if (!strcmp(s->name, name))
+            return s;
+    return NULL;
+}
+
+static bool override(struct booth_tables *tables, struct booth_settings *booth, const char *text,
+                     struct error *err)
+{
+    char section[32], key[64];
+    int value_at = 0;
+    if (sscanf(text, "%31[a-z].%63[a-z0-9_]=%n", section, key, &value_at) != 2 || !value_at)
+        return fail(err, ERROR_CONFIG, "\"%s\" is not of the form section.key=value", text);
+    struct settings_section *s = section_of(tables, section);
+    if (!s)
+        return fail(err, ERROR_CONFIG, "%s: there is no section [%s]", text, section);
+    if (!settings_set(s->rows, booth, key, text + value_at, err))
+        return while_doing(err, "[%s]", section);
+    return resolve(booth, NULL, section, key, err);
+}
+
+bool booth_load(const char *path, const char *const *overrides, int count,
+                struct booth_settings *booth, struct error *err)
+{
+    struct booth_settings loaded = {0};
+    struct booth_tables tables;
+    booth_tables_init(&tables, &loaded);
+    if (!ini_load(path, tables.sections, err))
+        return false;
+    if (!resolve(&loaded, path, NULL, NULL, err))
+        return while_doing(err, "%s", path);
+    for (int i = 0; i < count; i++)
+        if (!override(&tables, &loaded, overrides[i], err))
+            return while_doing(err, "--set");
+    *booth = loaded;
+    return true;
+}
+
+void booth_describe(FILE *out)
+{
+    struct booth_tables tables;
+    booth_tables_init(&tables, NULL);
+    fputs("# Settings of boothd; see boothd.conf(5). A line that begins with # is at its preset;\n"
+          "# the others must be filled in. Relative paths are relative to this file.\n",
+          out);
+    for (struct settings_section *s = tables.sections; s->name; s++) {
+        fputc('\n', out);
+        settings_describe(s, out);
+    }
+}
+
+static void describe_range(const struct setting *row, FILE *out)
+{
+    switch (row->type) {
+    case SETTING_DOUBLE:
+    case SETTING_INT:
+        fprintf(out, "Range %.9g..%.9g%s%s. ", row->least, row->most, *row->unit ? " " : "",
+                row->unit);
+        return;
+    case SETTING_VECTOR:
+        fprintf(out, "%zu numbers, each %.9g..%.9g%s%s. ", row->size, row->least, row->most,
+                *row->unit ? " " : "", row->unit);
+        return;
+    case SETTING_BOOL:
+        fputs("yes or no. ", out);
+        return;
+    case SETTING_ENUM:
+        fputs("One of", out);
+        for (int i = 0; row->choices[i]; i++)
+            fprintf(out, "%s %s", i ? "," : "", row->choices[i]);
+        fputs(". ", out);
+        return;
+    case SETTING_TEXT:
+        return;
+    }
+}
+
+void booth_describe_man(FILE *out)
+{
+    struct booth_tables tables;
+    booth_tables_init(&tables, NULL);
+    for (struct settings_section *s = tables.sections; s->name; s++) {
+        fprintf(out, ".SS [%s]\n", s->name);
+        for (const struct setting *row = s->rows; row->name; row++) {
+            fprintf(out, ".TP\n.B %s\n%s ", row->name, row->help);
+            describe_range(row, out);
+            if (!row->preset)
+                fputs("Must be given.\n", out);
+            else if (*row->preset)
+                fprintf(out, "Preset %s.\n", row->preset);
+            else
+                fputs("Preset: empty.\n", out);
+        }
+    }
+}
+
+const struct spectrometer_driver *booth_spectrometer(const struct booth_settings *b)
+{
+    return b->spectrometer.driver ? spectrometer_drivers[b->spectrometer.driver - 1] : NULL;
+}
+
+const struct accelerometer_driver *booth_accelerometer(const struct booth_settings *b)
+{
+    bool there = b->accelerometer.driver && *b->accelerometer.options.port;
+    return there ? accelerometer_drivers[b->accelerometer.driver - 1] : NULL;
+}
+
+const struct tracker_driver *booth_tracker(const struct booth_settings *b)
+{
+    return b->tracker.driver ? tracker_drivers[b->tracker.driver - 1] : NULL;
+}
+
+const struct radiometer_driver *booth_radiometer(const struct booth_settings *b)
+{
+    bool there = b->radiometer.driver && *b->radiometer.options.port;
+    return there ? radiometer_drivers[b->radiometer.driver - 1] : NULL;
+}
+
+int booth_bits(const struct booth_settings *booth)
+{
+    return booth->display.bits_choice ? 10 : 8;
+}
+
+struct rigid booth_from_tracker(const struct booth_settings *booth)
+{
+    const double rad = acos(-1) / 180;
+    struct mat3 roll = mat3_rotation(2, booth->tracker.roll_deg * rad);
+    struct mat3 pitch = mat3_rotation(0, -booth->tracker.pitch_deg * rad);
+    struct mat3 yaw = mat3_rotation(1, booth->tracker.yaw_deg * rad);
+    const double *at = booth->tracker.place_m;
+    return (struct rigid){mat3_mul(yaw, mat3_mul(pitch, roll)), {at[0], at[1], at[2]}};
+}
+
+bool booth_socket_default(const char *runtime_dir, char *out, size_t size, struct error *err)
+{
+    if (!runtime_dir || *runtime_dir != '/')
+        return fail(err, ERROR_CONFIG,
+                    "no control socket is set and XDG_RUNTIME_DIR names no folder for one");
+    if ((size_t)snprintf(out, size, "%s/boothd/boothd.sock", runtime_dir) >= size)
+        return fail(err, ERROR_CONFIG, "the path of the control socket in %s is too long",
+                    runtime_dir);
+    return true;
+}
+
+const char *booth_shipped_materials(void)
+{
+    return BOOTHD_DATADIR "/materials";
+}
