@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "config/spectra.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#include "colorimetry/illuminant.h"
+#include "files/cgats.h"
+#include "files/table.h"
+
+#define FIELD_SLACK_NM 0.51 // field names carry whole nanometres
+#define SURFACE_LEAST -0.1 // noise of an instrument
+#define SURFACE_MOST 2.0    // beyond it a "reflectance" is per cent or counts
+
+enum { FIELDS_LEAST = 2 };
+
+void spectra_fini(struct spectra *s)
+{
+    free(s->spectra);
+    free(s->names);
+    *s = (struct spectra){0};
+}
+
+static bool make_room(struct spectra *s, size_t count, struct error *err)
+{
+    s->spectra = calloc(count, sizeof *s->spectra);
+    s->names = calloc(count, sizeof *s->names);
+    if (!s->spectra || !s->names)
+        return fail(err, ERROR_SYSTEM, "out of memory for %zu spectra", count);
+    s->count = (int)count;
+    return true;
+}
+
+static void name_one(struct spectra *s, size_t i, const char *name)
+{
+    if (name && *name)
+        snprintf(s->names[i], sizeof s->names[i], "%s", name);
+    else
+        snprintf(s->names[i], sizeof s->names[i], "%zu", i + 1);
+}
+
+// What a value may be: a lamp's power is not negative, a surface is no per cent.
+static bool check_value(const char *path, int line, const char *name, double nm, double value,
+                        bool held, struct error *err)
+{
+    if (!held && value < 0)
+        return fail(err, ERROR_DATA, "%s:%d: %s: power %g at %g nm; it must be 0 or more", path,
+                    line, name, value, nm);
+    if (held && (value > SURFACE_MOST || value < SURFACE_LEAST))
+        return fail(err, ERROR_DATA,
+                    "%s:%d: %s: reflectance %g at %g nm; it must lie in 0..1 (is it per cent?)",
+                    path, line, name, value, nm);
+    return true;
+}
+
+// ---- CSV: wavelengths down, one spectrum a column ----------------------------
+
+static bool check_wavelengths(const struct table *t, struct error *err)
+{
+    if (t->columns < 2)
+        return fail(err, ERROR_DATA, "%s: %zu column; a spectrum needs \"nm, value\"", t->path,
+                    t->columns);
+    if (t->rows < 2)
+        return fail(err, ERROR_DATA, "%s: %zu line(s) of numbers; a spectrum needs at least 2",
+                    t->path, t->rows);
+    for (size_t i = 1; i < t->rows; i++)
+        if (table_at(t, i, 0) <= table_at(t, i - 1, 0))
+            return fail(err, ERROR_DATA,
+                        "%s:%d: wavelength %g nm does not follow %g nm; wavelengths must rise",
+                        t->path, t->lines[i], table_at(t, i, 0), table_at(t, i - 1, 0));
+    return true;
+}
+
+static bool csv_column(const struct table *t, size_t column, bool held, double *nm,
+                       double *values, struct spectra *out, struct error *err)
+{
+    name_one(out, column - 1, t->names[column]);
+    for (size_t i = 0; i < t->rows; i++) {
+        nm[i] = table_at(t, i, 0);
+        values[i] = table_at(t, i, column);
+        if (!check_value(t->path, t->lines[i], out->names[column - 1], nm[i], values[i], held, err))
+            return false;
+    }
+    if (!spectrum_from_samples(nm, values, t->rows, held, &out->spectra[column - 1], err))
+        return while_doing(err, "%s", t->path);
+    return true;
+}
+
+static bool from_csv(const struct table *t, bool held, struct spectra *out, struct error *err)
+{
+    if (!check_wavelengths(t, err) || !make_room(out, t->columns - 1, err))
+        return false;
+    double *room = calloc(2 * t->rows, sizeof *room);
+    bool ok = room || fail(err, ERROR_SYSTEM, "%s: out of memory", t->path);
+    for (size_t c = 1; c < t->columns && ok; c++)
+        ok = csv_column(t, c, held, room, room + t->rows, out, err);
+    free(room);
+    return ok;
+}
+
+// ---- CGATS: one spectrum a row, fields SPEC_380, SPEC_390, … -----------------
+
+struct fields {
+    size_t *columns; // of the SPEC_ fields, in order
+    double *nm;      // as their names say
+    size_t count;
+    double norm;
+};
+
+static bool find_fields(const struct table *t, struct fields *f, struct error *err)
+{
+    f->columns = calloc(t->columns + 1, sizeof *f->columns);
+    f->nm = calloc(2 * t->columns + 1, sizeof *f->nm);
+    if (!f->columns || !f->nm)
+        return fail(err, ERROR_SYSTEM, "%s: out of memory", t->path);
+    for (size_t c = 0; c < t->columns; c++) {
+        if (strncmp(t->names[c], "SPEC_", 5) != 0)
+            continue;
+        char *end;
+        f->nm[f->count] = strtod(t->names[c] + 5, &end);
+        if (*end || end == t->names[c] + 5)
+            return fail(err, ERROR_DATA, "%s: field %s names no wavelength", t->path, t->names[c]);
+        f->columns[f->count++] = c;
+    }
+    if (f->count < FIELDS_LEAST)
+        return fail(err, ERROR_DATA, "%s: %zu SPEC_ field(s); a spectrum needs at least %d",
+                    t->path, f->count, FIELDS_LEAST);
+    return true;
+}
+
+static int line_of(const struct cgats *file, const char *key)
+{
+    for (size_t i = 0; i < file->keyword_count; i++)
+        if (strcmp(file->keywords[i].name, key) == 0)
+            return file->keywords[i].line;
+    return 0;
+}
+
+static bool contradicts(const struct cgats *file, const char *key, double value,
+                        const char *fields_say, double is, struct error *err)
+{
+    return fail(err, ERROR_DATA, "%s:%d: %s is %g but %s %g", file->table.path,
+                line_of(file, key), key, value, fields_say, is);
+}
+
+// The header against the fields; wavelengths of full precision from the header.
+static bool check_header(const struct cgats *file, struct fields *f, struct error *err)
+{
+    double bands, start, end, norm;
+    if (!cgats_numbers(file, "SPECTRAL_BANDS", &bands, 1, err) ||
+        !cgats_numbers(file, "SPECTRAL_START_NM", &start, 1, err) ||
+        !cgats_numbers(file, "SPECTRAL_END_NM", &end, 1, err) ||
+        !cgats_numbers(file, "SPECTRAL_NORM", &norm, 1, err))
+        return false;
+    double first = f->nm[0], last = f->nm[f->count - 1];
+    if (bands != (double)f->count)
+        return contradicts(file, "SPECTRAL_BANDS", bands, "the number of SPEC_ fields is",
+                           (double)f->count, err);
+    if (fabs(start - first) > FIELD_SLACK_NM)
+        return contradicts(file, "SPECTRAL_START_NM", start, "the first field is SPEC_", first, err);
+    if (fabs(end - last) > FIELD_SLACK_NM)
+        return contradicts(file, "SPECTRAL_END_NM", end, "the last field is SPEC_", last, err);
+    if (!(norm > 0))
+        return fail(err, ERROR_DATA, "%s:%d: SPECTRAL_NORM is %g; it must be above 0",
+                    file->table.path, line_of(file, "SPECTRAL_NORM"), norm);
+    f->norm = norm;
+    for (size_t i = 0; i < f->count; i++) {
+        double nm = start + (end - start) * (double)i / (double)(f->count - 1);
+        if (fabs(nm - f->nm[i]) > FIELD_SLACK_NM)
+            return fail(err, ERROR_DATA,
+                        "%s: field SPEC_%g stands where SPECTRAL_START_NM %g, SPECTRAL_END_NM %g "
+                        "and SPECTRAL_BANDS %g put %g nm",
+                        file->table.path, f->nm[i], start, end, bands, nm);
+        f->nm[i] = nm;
+    }
+    return true;
+}
+
+static bool cgats_row(const struct table *t, size_t row, const struct fields *f, bool held,
+                      struct spectra *out, struct error *err)
+{
+    double *values = f->nm + f->count;
+    name_one(out, row, t->labels ? t->labels[row] : NULL);
+    for (size_t i = 0; i < f->count; i++) {
+        values[i] = table_at(t, row, f->columns[i]) / f->norm;
+        if (!check_value(t->path, t->lines[row], out->names[row], f->nm[i], values[i], held, err))
+            return false;
+    }
+    if (!spectrum_from_samples(f->nm, values, f->count, held, &out->spectra[row], err))
+        return while_doing(err, "%s:%d", t->path, t->lines[row]);
+    return true;
+}
+
+static bool from_cgats(const struct cgats *file, bool held, struct spectra *out, struct error *err)
+{
+    const struct table *t = &file->table;
+    struct fields f = {0};
+    bool ok = find_fields(t, &f, err) && check_header(file, &f, err);
+    if (ok && t->rows == 0)
+        ok = fail(err, ERROR_DATA, "%s: no spectrum between BEGIN_DATA and END_DATA", t->path);
+    ok = ok && make_room(out, t->rows, err);
+    for (size_t row = 0; row < t->rows && ok; row++)
+        ok = cgats_row(t, row, &f, held, out, err);
+    free(f.columns);
+    free(f.nm);
+    return ok;
+}
+
+// ---- either ------------------------------------------------------------------
+
+static bool ends_with(const char *text, const char *end)
+{
+    size_t n = strlen(text), m = strlen(end);
+    return n >= m && strcasecmp(text + n - m, end) == 0;
+}
+
+static bool load_cgats(const char *path, bool held, struct spectra *out, struct error *err)
+{
+    struct cgats file = {0};
+    bool ok = cgats_load(path, &file, err) && from_cgats(&file, held, out, err);
+    cgats_fini(&file);
+    return ok;
+}
+
+static bool load_csv(const char *path, bool held, struct spectra *out, struct error *err)
+{
+    struct table table = {0};
+    bool ok = csv_load(path, &table, err) && from_csv(&table, held, out, err);
+    table_fini(&table);
+    return ok;
+}
+
+bool spectra_load(const char *path, bool held, struct spectra *out, struct error *err)
+{
+    struct spectra loaded = {0};
+    bool cgats = ends_with(path, ".sp") || ends_with(path, ".ti3");
+    bool ok = cgats ? load_cgats(path, held, &loaded, err) : load_csv(path, held, &loaded, err);
+    if (!ok) {
+        spectra_fini(&loaded);
+        return false;
+    }
+    *out = loaded;
+    return true;
+}
+
+static bool is_path(const char *text)
+{
+    return strchr(text, '/') || ends_with(text, ".csv") || ends_with(text, ".sp");
+}
+
+bool lamp_spectrum(const char *name_or_path, struct spectrum *out, struct error *err)
+{
+    if (!is_path(name_or_path))
+        return illuminant(name_or_path, out, err);
+    struct spectra loaded = {0};
+    if (!spectra_load(name_or_path, false, &loaded, err))
+        return false;
+    bool lit = spectrum_sum(&loaded.spectra[0]) > 0;
+    if (lit)
+        *out = loaded.spectra[0];
+    spectra_fini(&loaded);
+    return lit || fail(err, ERROR_DATA, "%s: no light from %d to %d nm", name_or_path,
+                       SPECTRUM_FIRST_NM, SPECTRUM_LAST_NM);
+}
