@@ -261,6 +261,8 @@ json_t *control_call(struct control_client *client, json_t *request, int timeout
 struct caller {
     int fd; // -1 = free
     bool ended;
+    bool answered;    // late: lines that came meanwhile are to be looked at
+    uint64_t awaited; // ticket of the answer to come, 0 = none
     struct bytes in, out;
 };
 
@@ -270,6 +272,8 @@ struct control_server {
     struct sockaddr_un address;
     dev_t device;
     ino_t inode;
+    uint64_t tickets;
+    struct caller *asking; // whose request is being handled
     struct caller callers[CLIENTS_MOST];
 };
 
@@ -426,11 +430,12 @@ static bool read_more(struct caller *caller)
 }
 
 // Answers lines until one reply has to wait. False to hang up.
-static bool answer_lines(struct caller *caller, control_handler *handle, void *context)
+static bool answer_lines(struct control_server *server, struct caller *caller,
+                         control_handler *handle, void *context)
 {
     size_t done = 0;
     bool ok = flush(caller);
-    while (ok && !caller->out.used && done < caller->in.used) {
+    while (ok && !caller->awaited && !caller->out.used && done < caller->in.used) {
         char *line = caller->in.text + done;
         char *end = memchr(line, '\n', caller->in.used - done);
         size_t size = end ? (size_t)(end - line) : caller->in.used - done;
@@ -438,12 +443,46 @@ static bool answer_lines(struct caller *caller, control_handler *handle, void *c
             ok = false;
         if (!end || !ok)
             break;
-        ok = queue_reply(caller, answer(line, size, handle, context)) && flush(caller);
+        server->asking = caller;
+        json_t *reply = answer(line, size, handle, context);
+        server->asking = NULL;
         done += size + 1;
+        if (caller->awaited)
+            json_decref(reply);
+        else
+            ok = queue_reply(caller, reply) && flush(caller);
     }
     if (done)
         bytes_drop(&caller->in, done);
-    return ok && !(caller->ended && !caller->out.used);
+    return ok && !(caller->ended && !caller->out.used && !caller->awaited);
+}
+
+uint64_t control_later(struct control_server *server)
+{
+    if (!server->asking)
+        return 0;
+    return server->asking->awaited = ++server->tickets;
+}
+
+void control_answer(struct control_server *server, uint64_t ticket, json_t *reply,
+                    const struct error *err)
+{
+    struct caller *caller = NULL;
+    for (int i = 0; ticket && i < CLIENTS_MOST; i++)
+        if (server->callers[i].awaited == ticket)
+            caller = &server->callers[i];
+    if (!caller) {
+        json_decref(reply);
+        return;
+    }
+    caller->awaited = 0;
+    caller->answered = true;
+    if (reply && json_object_set_new(reply, "ok", json_true())) {
+        json_decref(reply);
+        reply = NULL;
+    }
+    if (!queue_reply(caller, reply ? reply : refusal(err)) || !flush(caller))
+        hang_up(caller);
 }
 
 static void turn_away(int fd)
@@ -471,13 +510,14 @@ static void accept_callers(struct control_server *server)
     }
 }
 
-static void serve_caller(struct caller *caller, short events, control_handler *handle,
-                         void *context)
+static void serve_caller(struct control_server *server, struct caller *caller, short events,
+                         control_handler *handle, void *context)
 {
-    bool ok = !(events & (POLLERR | POLLNVAL));
-    if (ok && !caller->out.used && events & (POLLIN | POLLHUP))
+    bool ok = !(events & (POLLERR | POLLNVAL)) && !(caller->awaited && events & POLLHUP);
+    caller->answered = false;
+    if (ok && !caller->out.used && !caller->awaited && events & (POLLIN | POLLHUP))
         ok = read_more(caller);
-    if (!ok || !answer_lines(caller, handle, context))
+    if (!ok || !answer_lines(server, caller, handle, context))
         hang_up(caller);
 }
 
@@ -487,7 +527,10 @@ bool control_serve(struct control_server *server, int timeout_ms, control_handle
     struct pollfd polled[CLIENTS_MOST + 1];
     for (int i = 0; i < CLIENTS_MOST; i++) {
         const struct caller *caller = &server->callers[i];
-        polled[i] = (struct pollfd){caller->fd, caller->out.used ? POLLOUT : POLLIN, 0};
+        short events = caller->awaited ? 0 : caller->out.used ? POLLOUT : POLLIN;
+        polled[i] = (struct pollfd){caller->fd, events, 0};
+        if (caller->answered)
+            timeout_ms = 0;
     }
     polled[CLIENTS_MOST] = (struct pollfd){server->resting ? -1 : server->fd, POLLIN, 0};
     bool short_wait = server->resting && (timeout_ms < 0 || timeout_ms > REST_MS);
@@ -496,8 +539,8 @@ bool control_serve(struct control_server *server, int timeout_ms, control_handle
     if (ready < 0)
         return errno == EINTR || fail_errno(err, "%s: cannot wait", server->address.sun_path);
     for (int i = 0; i < CLIENTS_MOST; i++)
-        if (polled[i].revents)
-            serve_caller(&server->callers[i], polled[i].revents, handle, context);
+        if (polled[i].revents || server->callers[i].answered)
+            serve_caller(server, &server->callers[i], polled[i].revents, handle, context);
     if (polled[CLIENTS_MOST].revents)
         accept_callers(server);
     return true;

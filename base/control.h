@@ -63,4 +63,14 @@ void control_unlisten(struct control_server *server);
 bool control_serve(struct control_server *server, int timeout_ms, control_handler *handle,
                    void *context, struct error *err);
 
+// For a handler that cannot answer at once: returns a ticket (never 0) for the
+// request it is handling and then returns NULL. The client's further lines
+// wait meanwhile; other clients do not. 0 outside a handler.
+uint64_t control_later(struct control_server *server);
+
+// The answer to a ticket, from the thread that calls control_serve: reply
+// (stolen), or NULL with err filled. Forgotten when the client has gone.
+void control_answer(struct control_server *server, uint64_t ticket, json_t *reply,
+                    const struct error *err);
+
 #endif
