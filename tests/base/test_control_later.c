@@ -6,6 +6,7 @@
 #include <stdint.h>
 
 #include <cmocka.h>
+#undef fail // ours is a function
 
 #include <pthread.h>
 #include <stdlib.h>
@@ -14,8 +15,6 @@
 
 #include "base/clock.h"
 #include "base/control.h"
-
-#undef fail // cmocka's, not ours
 
 enum { PATIENCE_MS = 20000 };
 
