@@ -14,7 +14,7 @@ enum { FACTS_PATCHES = 64, FACTS_LAMPS = 8, FACTS_POSES = 32 };
 
 // One patch under one lamp. Tristimulus values are absolute, cd/m2, 1931 2
 // degrees, unless a name says otherwise.
-struct patch_facts {
+struct patch_report {
     char name[64];
     struct xyz reference; // what a physical sample sends from that place
     struct xyz measured;  // what the radiometer read from the screen
@@ -32,7 +32,7 @@ struct proof_summary {
     struct summary simulation, published, published_in_gamut, absolute, absolute_in_gamut;
 };
 
-struct lamp_facts {
+struct lamp_report {
     char name[64], asked[512]; // asked: the spectrum named for an emulated lamp, else ""
     struct spectrum irradiance; // as taught, W m-2 nm-1
     double lux, spread;         // at the spectrometer; relative spread of the readings
@@ -44,13 +44,13 @@ struct lamp_facts {
     struct xyz white_reference, white_measured; // perfect diffuser at the screen's centre, cd/m2
     double white_error_percent;                 // of luminance
     int patch_count;
-    struct patch_facts patches[FACTS_PATCHES];
+    struct patch_report patches[FACTS_PATCHES];
     int white_patch; // index of the patch that the published method divides by
     struct proof_summary proof;
     char picture[512]; // PNG of what the screen showed
 };
 
-struct display_facts {
+struct display_report {
     char measurements[512], model[512]; // files
     int patches, verified;
     struct summary fit, verification; // dE00
@@ -60,7 +60,7 @@ struct display_facts {
 };
 
 // White shown after moving the screen or the head.
-struct pose_facts {
+struct pose_report {
     double tilt_deg, tilt_seen_deg;
     struct vec3 eye, eye_seen; // booth frame, m
     bool moved_screen;         // white was measured again
@@ -73,9 +73,9 @@ struct session_facts {
     bool emulated;
     bool truth_emulated; // reference comes from the emulated booth, else from the taught spectrum
     int lamp_count, pose_count;
-    struct lamp_facts lamps[FACTS_LAMPS];
-    struct display_facts display;
-    struct pose_facts poses[FACTS_POSES];
+    struct lamp_report lamps[FACTS_LAMPS];
+    struct display_report display;
+    struct pose_report poses[FACTS_POSES];
     json_t *settings; // of the daemon: its status at the start
     json_t *readings; // array: every reply of the radiometer and every taught spectrum, as it came
     double seconds;

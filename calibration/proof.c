@@ -27,9 +27,9 @@ bool proof_published_difference(struct xyz a, struct xyz b, struct xyz white, do
     return true;
 }
 
-static bool judge_patch(struct lamp_facts *lamp, struct patch_facts *p, struct error *err)
+static bool judge_patch(struct lamp_report *lamp, struct patch_report *p, struct error *err)
 {
-    const struct patch_facts *w = &lamp->patches[lamp->white_patch];
+    const struct patch_report *w = &lamp->patches[lamp->white_patch];
     struct xyz white = divided(lamp->white_reference, lamp->white_reference.Y);
     struct lab reference, measured;
     if (!proof_published_difference(divided(p->full, WHITE_PATCH_FACTOR * w->full.Y),
@@ -45,16 +45,16 @@ static bool judge_patch(struct lamp_facts *lamp, struct patch_facts *p, struct e
     return true;
 }
 
-bool proof_judge(struct lamp_facts *lamp, struct error *err)
+bool proof_judge(struct lamp_report *lamp, struct error *err)
 {
-    const struct patch_facts *w = &lamp->patches[lamp->white_patch];
+    const struct patch_report *w = &lamp->patches[lamp->white_patch];
     if (!(w->measured.Y > 0 && w->reference.Y > 0 && w->full.Y > 0 && w->bands.Y > 0 &&
           lamp->white_reference.Y > 0))
         return fail(err, ERROR_DATA, "lamp %s: a white whose luminance is not positive", lamp->name);
     double all[3][FACTS_PATCHES], inside[2][FACTS_PATCHES];
     int inside_count = 0;
     for (int i = 0; i < lamp->patch_count; i++) {
-        struct patch_facts *p = &lamp->patches[i];
+        struct patch_report *p = &lamp->patches[i];
         if (!judge_patch(lamp, p, err))
             return false;
         all[0][i] = p->de_simulation;

@@ -14,7 +14,7 @@
 // Absolute: cd/m2, no division, no adaptation; the white of CIELAB is the
 // perfect diffuser at that place under that lamp.
 // Errors (DATA): a white that is not positive.
-bool proof_judge(struct lamp_facts *lamp, struct error *err);
+bool proof_judge(struct lamp_report *lamp, struct error *err);
 
 // One colour difference as published: both colours are already divided, Y = 1
 // for the perfect diffuser; white is the lamp's perfect diffuser.

@@ -57,7 +57,7 @@ static void published_row(FILE *out, const char *what, const double v[4])
                 what, v[0], v[1], v[2], v[3]);
 }
 
-static void lamp_summary(FILE *out, const struct lamp_facts *l)
+static void lamp_summary(FILE *out, const struct lamp_report *l)
 {
     fprintf(out, "<table><thead><tr><th>&Delta;E00</th><th>mean</th><th>std</th><th>90th</th><th>max</th>"
                  "<th>patches</th></tr></thead>\n");
@@ -76,7 +76,7 @@ static void lamp_summary(FILE *out, const struct lamp_facts *l)
     fprintf(out, "</table>\n");
 }
 
-static void lamp_bars(FILE *out, const struct lamp_facts *l)
+static void lamp_bars(FILE *out, const struct lamp_report *l)
 {
     const char *names[FACTS_PATCHES];
     double values[2 * FACTS_PATCHES];
@@ -89,13 +89,13 @@ static void lamp_bars(FILE *out, const struct lamp_facts *l)
              (const char *const[]){"#0e7490", "#d97706"}, (const char *const[]){"as published", "absolute"});
 }
 
-static void lamp_patches(FILE *out, const struct lamp_facts *l)
+static void lamp_patches(FILE *out, const struct lamp_report *l)
 {
     fprintf(out, "<table><thead><tr><th>patch</th><th>X</th><th>Y</th><th>Z reference</th><th>X</th><th>Y</th>"
                  "<th>Z measured</th><th>simulation</th><th>published</th><th>absolute</th><th>gamut</th>"
                  "<th>reading</th></tr></thead>\n");
     for (int i = 0; i < l->patch_count; i++) {
-        const struct patch_facts *p = &l->patches[i];
+        const struct patch_report *p = &l->patches[i];
         fprintf(out, "<tr><td>");
         svg_escaped(out, p->name);
         fprintf(out,
@@ -129,7 +129,7 @@ static bool picture(FILE *out, const char *path, struct error *err)
     return true;
 }
 
-static bool lamp_section(FILE *out, const struct lamp_facts *l, struct error *err)
+static bool lamp_section(FILE *out, const struct lamp_report *l, struct error *err)
 {
     fprintf(out, "<h2>Lamp ");
     svg_escaped(out, l->name);
@@ -175,7 +175,7 @@ static void chromaticities(FILE *out, const struct session_facts *f)
     enum observer observer = OBSERVER_1931_2;
     observer_from_name(f->observer, &observer);
     for (int l = 0; l < f->lamp_count; l++) {
-        const struct lamp_facts *lamp = &f->lamps[l];
+        const struct lamp_report *lamp = &f->lamps[l];
         for (int i = 0; i < lamp->patch_count; i++) {
             struct uv c = uv_of(lamp->patches[i].measured);
             u[l][i] = c.u;
@@ -187,7 +187,7 @@ static void chromaticities(FILE *out, const struct session_facts *f)
     svg_chromaticities(out, observer, series, f->lamp_count);
 }
 
-static void display_section(FILE *out, const struct display_facts *d)
+static void display_section(FILE *out, const struct display_report *d)
 {
     fprintf(out,
             "<h2>Display model</h2>\n<p>Day/Taplin/Berns from %d patches (<code>%s</code>), checked on %d others. "
@@ -206,7 +206,7 @@ static void poses(FILE *out, const struct session_facts *f)
     fprintf(out, "<h2>Screen tilted, head moved</h2>\n<table><thead><tr><th>tilt</th><th>seen</th>"
                  "<th>eye off by, mm</th><th>white reference</th><th>white shown, cd/m²</th><th>error</th></tr></thead>\n");
     for (int i = 0; i < f->pose_count; i++) {
-        const struct pose_facts *p = &f->poses[i];
+        const struct pose_report *p = &f->poses[i];
         fprintf(out, "<tr><td>%.1f°</td><td>%.2f°</td><td>%.1f</td>", p->tilt_deg, p->tilt_seen_deg,
                 1000 * vec3_length(vec3_sub(p->eye, p->eye_seen)));
         if (p->moved_screen)

@@ -14,7 +14,7 @@ static json_t *json_summary(const struct summary *s)
                      s->median, "p90", s->p90, "p95", s->p95, "p99", s->p99, "max", s->max);
 }
 
-static json_t *json_patch(const struct patch_facts *p)
+static json_t *json_patch(const struct patch_report *p)
 {
     return json_pack("{ss,so,so,so,so,sb,si,sf,sf,sf}", "name", p->name, "reference_cdm2",
                      json_xyz(p->reference), "measured_cdm2", json_xyz(p->measured), "full_relative",
@@ -23,7 +23,7 @@ static json_t *json_patch(const struct patch_facts *p)
                      p->de_published, "de00_absolute", p->de_absolute);
 }
 
-static json_t *json_lamp(const struct lamp_facts *l)
+static json_t *json_lamp(const struct lamp_report *l)
 {
     json_t *patches = json_array(), *irradiance = json_array();
     for (int i = 0; i < l->patch_count; i++)
@@ -46,7 +46,7 @@ static json_t *json_lamp(const struct lamp_facts *l)
     return out;
 }
 
-static json_t *json_display(const struct display_facts *d)
+static json_t *json_display(const struct display_report *d)
 {
     return json_pack("{ss,ss,si,si,so,so,sf,so,so,sf}", "measurements", d->measurements, "model",
                      d->model, "patches", d->patches, "verification_patches", d->verified, "fit_de00",
@@ -55,7 +55,7 @@ static json_t *json_display(const struct display_facts *d)
                      json_xyz(d->black), "white_drift_percent", d->white_drift_percent);
 }
 
-static json_t *json_pose(const struct pose_facts *p)
+static json_t *json_pose(const struct pose_report *p)
 {
     json_t *out = json_pack("{sf,sf,s[fff],s[fff]}", "tilt_deg", p->tilt_deg, "tilt_seen_deg",
                             p->tilt_seen_deg, "eye_m", p->eye.x, p->eye.y, p->eye.z, "eye_seen_m",

@@ -27,7 +27,7 @@ static void published(FILE *out, const char *lamp)
     }
 }
 
-static void lamp_table(FILE *out, const struct lamp_facts *l)
+static void lamp_table(FILE *out, const struct lamp_report *l)
 {
     fprintf(out, "\nLamp %s: x %.4f y %.4f", l->name, l->chromaticity.x, l->chromaticity.y);
     if (l->cct.valid)
@@ -45,7 +45,7 @@ static void lamp_table(FILE *out, const struct lamp_facts *l)
 
 void report_as_text(const struct session_facts *f, FILE *out)
 {
-    const struct display_facts *d = &f->display;
+    const struct display_report *d = &f->display;
     fprintf(out, "%s, %s, observer %s%s\n", f->booth, f->software, f->observer,
             f->emulated ? ", EMULATED instruments" : "");
     fprintf(out, "Display model: %d patches fitted, dE00 mean %.2f max %.2f; %d others, mean %.2f max %.2f\n",
@@ -55,7 +55,7 @@ void report_as_text(const struct session_facts *f, FILE *out)
         lamp_table(out, &f->lamps[i]);
     fprintf(out, "\nMoved screen and head\n");
     for (int i = 0; i < f->pose_count; i++) {
-        const struct pose_facts *p = &f->poses[i];
+        const struct pose_report *p = &f->poses[i];
         fprintf(out, "  tilt %5.1f (seen %6.2f) deg, eye off by %4.1f mm", p->tilt_deg,
                 p->tilt_seen_deg, 1000 * vec3_length(vec3_sub(p->eye, p->eye_seen)));
         if (p->moved_screen)

@@ -1,0 +1,66 @@
+#!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
+# The main job on emulated instruments: boothsim brings up the booth, boothd
+# runs against it, boothcal works through a session.
+#   demo.sh FOLDER       results go to FOLDER; programs come from $BUILD (build)
+# LAMP_A, LAMP_D50, LAMP_D65 replace a lamp's spectrum: a CIE name or a file.
+set -eu
+
+programs=$(cd "${BUILD:-build}" && pwd)
+root=$(cd "$(dirname "$0")/.." && pwd)
+lamps="A D50 D65"
+
+spectrum_of() {
+    case $1 in
+    A) echo "${LAMP_A:-A}" ;;
+    D50) echo "${LAMP_D50:-FL8}" ;;
+    D65) echo "${LAMP_D65:-FL3.15}" ;;
+    esac
+}
+
+if [ "$1" = --inside ]; then
+    out=$2
+    run=$out/run
+    daemon=
+    trap '[ -z "$daemon" ] || kill "$daemon" 2>/dev/null || :' EXIT
+    "$programs/boothd" --config "$run/boothd.conf" 2>"$out/boothd.log" &
+    daemon=$!
+    tries=0
+    until "$programs/boothctl" --socket "$run/boothd.sock" status >/dev/null 2>&1; do
+        tries=$((tries + 1))
+        if [ $tries -gt 100 ] || ! kill -0 "$daemon" 2>/dev/null; then
+            echo "demo: boothd did not start; its log:" >&2
+            cat "$out/boothd.log" >&2
+            exit 1
+        fi
+        sleep 0.2
+    done
+    set --
+    for lamp in $lamps; do set -- "$@" --lamp "$lamp=$(spectrum_of $lamp)"; done
+    "$programs/boothcal" session --config "$run/boothd.conf" --socket "$run/boothd.sock" \
+        --booth "$run/boothsim.sock" --maps "$run" --out "$out" "$@"
+    "$programs/boothctl" --socket "$run/boothd.sock" quit >/dev/null
+    wait "$daemon"
+    daemon=
+    cp "$run/display.ini" "$out/display.ini"
+    exit 0
+fi
+
+mkdir -p "$1"
+out=$(cd "$1" && pwd)
+run=$out/run
+rm -rf "$run"
+mkdir -p "$run/lamps"
+sed "s|^folder = lamps|folder = $run/lamps|" "$root/config/booths/emulated.conf" >"$run/boothd.conf"
+cat >>"$run/boothd.conf" <<END
+
+[materials]
+folder = $root/config/materials
+
+[control]
+socket = $run/boothd.sock
+END
+set --
+for lamp in $lamps; do set -- "$@" --lamp "$lamp=$(spectrum_of $lamp)"; done
+exec "$programs/boothsim" --scenario "$root/simulator/scenarios/booth.ini" --run "$run" "$@" -- \
+    "$root/calibration/demo.sh" --inside "$out"

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/session.h"
+
+#include <errno.h>
+#include <getopt.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/clock.h"
+#include "calibration/commands.h"
+#include "calibration/report.h"
+
+static const char USAGE[] =
+    "usage: boothcal session --config FILE --maps FOLDER -o FOLDER [options]\n"
+    "\n"
+    "From bare settings to an accuracy report, through the running boothd: teaches the\n"
+    "lamps, characterises the display in the dark booth, proofs a chart under each lamp,\n"
+    "tilts the screen and moves the head. Without --booth it asks you to turn the knobs.\n"
+    "\n"
+    "  --config FILE        boothd's settings\n"
+    "  --socket PATH        boothd's control socket (default: the settings')\n"
+    "  --booth PATH         control socket of an emulated booth\n"
+    "  --maps FOLDER        luminance maps ceiling-LAMP.exr (cd/m2, channel Y)\n"
+    "  --lamp NAME[=TEXT]   a lamp of the booth, in order; TEXT is noted in the report\n"
+    "                       (default: A, D50, D65)\n"
+    "  --material NAME      chart to proof (default: colorchecker24)\n"
+    "  -o, --out FOLDER     where report.html, report.json, display.ti3 and pictures go\n"
+    "  --help\n";
+
+struct options {
+    const char *config, *socket, *booth, *maps, *out, *material;
+    const char *lamps[FACTS_LAMPS];
+    int lamp_count;
+};
+
+static int misused(const char *text)
+{
+    fprintf(stderr, "boothcal session: %s\n", text);
+    return COMMAND_USAGE;
+}
+
+static int parse(int argc, char **argv, struct options *o)
+{
+    static const struct option LONG[] = {
+        {"config", required_argument, NULL, 'c'}, {"socket", required_argument, NULL, 's'},
+        {"booth", required_argument, NULL, 'b'},  {"maps", required_argument, NULL, 'm'},
+        {"lamp", required_argument, NULL, 'l'},   {"material", required_argument, NULL, 'k'},
+        {"out", required_argument, NULL, 'o'},    {"help", no_argument, NULL, 'h'},
+        {0},
+    };
+    *o = (struct options){.material = "colorchecker24"};
+    for (int c; (c = getopt_long(argc, argv, "o:h", LONG, NULL)) != -1;) {
+        switch (c) {
+        case 'c': o->config = optarg; break;
+        case 's': o->socket = optarg; break;
+        case 'b': o->booth = optarg; break;
+        case 'm': o->maps = optarg; break;
+        case 'k': o->material = optarg; break;
+        case 'o': o->out = optarg; break;
+        case 'l':
+            if (o->lamp_count == FACTS_LAMPS)
+                return misused("more than 8 lamps");
+            o->lamps[o->lamp_count++] = optarg;
+            break;
+        case 'h': fputs(USAGE, stdout); return -1;
+        default: return COMMAND_USAGE;
+        }
+    }
+    if (optind != argc || !o->config || !o->maps || !o->out)
+        return misused("--config, --maps and --out are needed; see --help");
+    return 0;
+}
+
+static void take_lamps(const struct options *o, struct session_facts *f)
+{
+    static const char *const PRESET[] = {"A", "D50", "D65"};
+    f->lamp_count = o->lamp_count ? o->lamp_count : 3;
+    for (int i = 0; i < f->lamp_count; i++) {
+        const char *text = o->lamp_count ? o->lamps[i] : PRESET[i];
+        size_t length = strcspn(text, "=");
+        snprintf(f->lamps[i].name, sizeof f->lamps[i].name, "%.*s", (int)length, text);
+        snprintf(f->lamps[i].asked, sizeof f->lamps[i].asked, "%s",
+                 text[length] ? text + length + 1 : "");
+    }
+}
+
+static bool begin(struct session *s, const struct options *o, struct error *err)
+{
+    struct session_facts *f = s->facts;
+    const char *socket = o->socket ? o->socket : s->settings.control.socket;
+    if (mkdir(o->out, 0777) && errno != EEXIST)
+        return fail_errno(err, "%s", o->out);
+    if (!(s->bench.daemon = control_connect(socket, err)) ||
+        (o->booth && !(s->bench.booth = control_connect(o->booth, err))))
+        return false;
+    take_lamps(o, f);
+    s->bench.terminal = isatty(STDERR_FILENO);
+    s->bench.readings = f->readings = json_array();
+    snprintf(f->booth, sizeof f->booth, "%s", s->settings.booth.name);
+    snprintf(f->software, sizeof f->software, "boothd %s", BOOTHD_VERSION);
+    snprintf(f->observer, sizeof f->observer, "%s",
+             observer_name((enum observer)s->settings.quality.observer));
+    f->emulated = f->truth_emulated = s->bench.booth;
+    clock_utc(f->started);
+    return true;
+}
+
+static void say(const struct session *s, const char *text)
+{
+    if (s->bench.terminal)
+        fprintf(stderr, "%s\n", text);
+}
+
+static bool steps(struct session *s, struct error *err)
+{
+    struct session_facts *f = s->facts;
+    say(s, "Teaching the lamps");
+    for (int i = 0; i < f->lamp_count; i++) {
+        if (!session_teach(s, i, err))
+            return false;
+        bench_progress(&s->bench, "lamps", i + 1, f->lamp_count);
+    }
+    if (!bench_reload(&s->bench, err))
+        return false;
+    say(s, "Characterising the display in the dark booth");
+    if (!session_characterise(s, err))
+        return false;
+    say(s, "Proofing the chart");
+    for (int i = 0; i < f->lamp_count; i++)
+        if (!session_proof(s, i, err))
+            return false;
+    say(s, "Tilting the screen, moving the head");
+    return session_poses(s, err) && (f->settings = bench_status(&s->bench, err));
+}
+
+static bool run(struct session *s, const struct options *o, struct error *err)
+{
+    int64_t began = clock_now_ns();
+    if (!booth_load(o->config, NULL, 0, &s->settings, err) || !begin(s, o, err) || !steps(s, err))
+        return false;
+    clock_utc(s->facts->finished);
+    s->facts->seconds = (double)(clock_now_ns() - began) / 1e9;
+    if (!report_save(s->facts, s->out, err))
+        return false;
+    report_as_text(s->facts, stdout);
+    printf("\n%s/report.html\n", s->out);
+    return true;
+}
+
+int command_session(int argc, char **argv)
+{
+    struct options o;
+    int misuse = parse(argc, argv, &o);
+    if (misuse)
+        return misuse < 0 ? COMMAND_FINE : misuse;
+    struct session_facts *facts = calloc(1, sizeof *facts);
+    struct session *s = calloc(1, sizeof *s);
+    struct error err = {0};
+    bool fine = false;
+    if (facts && s) {
+        *s = (struct session){.facts = facts, .out = o.out, .maps = o.maps, .material = o.material};
+        fine = run(s, &o, &err);
+        control_close(s->bench.daemon);
+        control_close(s->bench.booth);
+        json_decref(facts->settings);
+        json_decref(facts->readings);
+    }
+    if (!fine)
+        fprintf(stderr, "boothcal session: %s\n", err.text);
+    free(s);
+    free(facts);
+    return fine ? COMMAND_FINE : err.code == ERROR_CONFIG ? COMMAND_USAGE : COMMAND_FAILED;
+}

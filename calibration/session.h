@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// A session from bare settings to an accuracy report, step by step. Each step
+// takes the bench and fills its part of the facts.
+#ifndef CALIBRATION_SESSION_H
+#define CALIBRATION_SESSION_H
+
+#include "calibration/bench.h"
+#include "calibration/facts.h"
+#include "config/booth.h"
+
+struct session {
+    struct bench bench;
+    struct booth_settings settings; // boothd's own
+    struct session_facts *facts;
+    const char *out;       // folder of the results
+    const char *maps;      // folder of luminance maps "ceiling-<lamp>.exr"
+    const char *material;  // chart to proof
+};
+
+// Teaches lamp i from live readings, scales its luminance map by spot readings
+// and writes it into boothd's lamp folder.
+bool session_teach(struct session *s, int lamp, struct error *err);
+
+// In the dark booth: measures ramps, greys and random patches in random order
+// with white repeated, writes display.ti3 and verify.ti3, fits the display
+// model, saves it where boothd loads it, checks it on the patches kept apart.
+bool session_characterise(struct session *s, struct error *err);
+
+// Shows each patch of the chart at the screen's centre under lamp i, measures
+// it and its reference, and captures the whole chart as PNG.
+bool session_proof(struct session *s, int lamp, struct error *err);
+
+// Tilts the screen and moves the head under the last lamp; white again.
+bool session_poses(struct session *s, struct error *err);
+
+#endif

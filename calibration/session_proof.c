@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "calibration/proof.h"
+#include "calibration/session.h"
+#include "config/materials.h"
+
+static const double POSE_TILTS_DEG[] = {10, 20, 45};
+static const struct vec3 POSE_EYES[] = {{-0.10, 0.55, 0.60}, {0.12, 0.50, 0.70}};
+
+// What the patches are without an emulated booth to ask: their spectra under
+// the lamp as taught, at the illuminance that the reference integrates.
+static bool predicted(struct session *s, const struct lamp_report *lamp,
+                      const struct spectrum *reflectances, int count, struct xyz *out,
+                      struct error *err)
+{
+    json_t *reply = control_call(s->bench.daemon,
+                                 json_pack("{ss,si,si}", "do", CONTROL_PROBE, "x_px",
+                                           s->settings.screen.width_px / 2, "y_px",
+                                           s->settings.screen.height_px / 2),
+                                 60000, err);
+    if (!reply)
+        return false;
+    double lux = json_number_value(json_object_get(reply, "lux"));
+    json_decref(reply);
+    for (int i = 0; i < count; i++) {
+        struct xyz c = xyz_relative(&lamp->irradiance, &reflectances[i], OBSERVER_1931_2);
+        double k = lux / 100 / acos(-1);
+        out[i] = (struct xyz){k * c.X, k * c.Y, k * c.Z};
+    }
+    return true;
+}
+
+static bool references(struct session *s, const struct lamp_report *lamp,
+                       const struct spectrum *reflectances, int count, struct xyz *out,
+                       struct error *err)
+{
+    return s->bench.booth ? bench_truth(&s->bench, reflectances, count, out, err)
+                          : predicted(s, lamp, reflectances, count, out, err);
+}
+
+static bool simulate(struct lamp_report *lamp, const struct material *chart, int bands,
+                     struct error *err)
+{
+    struct band_set set;
+    struct band_matrix matrix;
+    if (!band_set_shipped(bands, &set, err) ||
+        !band_matrix_adapted(&set, &lamp->irradiance, OBSERVER_1931_2, &matrix, err))
+        return false;
+    for (int i = 0; i < lamp->patch_count; i++) {
+        struct bands c = bands_of(&set, &chart->palette[i]);
+        lamp->patches[i].full = xyz_relative(&lamp->irradiance, &chart->palette[i], OBSERVER_1931_2);
+        lamp->patches[i].bands = band_xyz(&matrix, &c);
+    }
+    return true;
+}
+
+static int lightest(const struct lamp_report *lamp)
+{
+    int best = 0;
+    for (int i = 1; i < lamp->patch_count; i++)
+        if (lamp->patches[i].full.Y > lamp->patches[best].full.Y)
+            best = i;
+    return best;
+}
+
+static bool measure_patches(struct session *s, struct lamp_report *lamp, struct error *err)
+{
+    struct bench *b = &s->bench;
+    int x = s->settings.screen.width_px / 2, y = s->settings.screen.height_px / 2;
+    for (int i = 0; i < lamp->patch_count; i++) {
+        struct patch_report *p = &lamp->patches[i];
+        char what[160];
+        snprintf(what, sizeof what, "%s under %s", p->name, lamp->name);
+        if (!bench_show(b, s->material, p->name, err) || !bench_in_gamut(b, x, y, &p->in_gamut, err) ||
+            !bench_measure(b, what, &p->measured, &p->reading, err))
+            return false;
+        bench_progress(b, lamp->name, i + 1, lamp->patch_count);
+    }
+    return true;
+}
+
+static bool measure_white(struct session *s, const struct lamp_report *lamp, struct xyz *reference,
+                          struct xyz *measured, struct error *err)
+{
+    struct spectrum diffuser;
+    for (int i = 0; i < SPECTRUM_COUNT; i++)
+        diffuser.v[i] = 1;
+    return bench_show(&s->bench, "white", NULL, err) &&
+           references(s, lamp, &diffuser, 1, reference, err) &&
+           bench_measure(&s->bench, "perfect diffuser", measured, NULL, err);
+}
+
+static bool take_names(struct lamp_report *lamp, const struct material *chart, struct error *err)
+{
+    for (int i = 0; i < chart->palette_count && i < FACTS_PATCHES; i++)
+        if (strcmp(chart->palette_names[i], "background"))
+            snprintf(lamp->patches[lamp->patch_count++].name, sizeof lamp->patches->name, "%s",
+                     chart->palette_names[i]);
+    if (!lamp->patch_count || chart->palette_count > FACTS_PATCHES)
+        return fail(err, ERROR_CONFIG, "%s: a chart of 1..%d patches with spectra is needed",
+                    chart->name, FACTS_PATCHES);
+    return true;
+}
+
+static bool reference_patches(struct session *s, struct lamp_report *lamp,
+                              const struct material *chart, struct error *err)
+{
+    struct xyz references_xyz[FACTS_PATCHES];
+    if (!references(s, lamp, chart->palette, lamp->patch_count, references_xyz, err))
+        return false;
+    for (int i = 0; i < lamp->patch_count; i++)
+        lamp->patches[i].reference = references_xyz[i];
+    return true;
+}
+
+static bool picture(struct session *s, struct lamp_report *lamp, struct error *err)
+{
+    char path[sizeof lamp->picture];
+    snprintf(path, sizeof path, "%.400s/chart-%.60s.png", s->out, lamp->name);
+    memcpy(lamp->picture, path, sizeof path);
+    return bench_show(&s->bench, s->material, NULL, err) &&
+           bench_capture(&s->bench, lamp->picture, err);
+}
+
+static bool proof_chart(struct session *s, struct lamp_report *lamp, const struct material *chart,
+                        struct error *err)
+{
+    if (!take_names(lamp, chart, err) || !simulate(lamp, chart, s->settings.quality.bands, err))
+        return false;
+    lamp->white_patch = lightest(lamp);
+    return measure_white(s, lamp, &lamp->white_reference, &lamp->white_measured, err) &&
+           reference_patches(s, lamp, chart, err) && measure_patches(s, lamp, err) &&
+           picture(s, lamp, err) && proof_judge(lamp, err);
+}
+
+bool session_proof(struct session *s, int index, struct error *err)
+{
+    struct lamp_report *lamp = &s->facts->lamps[index];
+    struct bench *b = &s->bench;
+    if (!bench_lamp(b, lamp->name, err) || !bench_await_lamp(b, lamp->name, 30, err) ||
+        !bench_aim_screen(b, s->settings.screen.width_px / 2.0, s->settings.screen.height_px / 2.0, err))
+        return false;
+    struct material chart = {0};
+    if (!material_load(&s->settings, s->material, &chart, err))
+        return false;
+    bool fine = proof_chart(s, lamp, &chart, err);
+    material_fini(&chart);
+    return fine || while_doing(err, "lamp %s", lamp->name);
+}
+
+static bool seen(struct session *s, struct pose_report *pose, struct error *err)
+{
+    json_t *status = bench_status(&s->bench, err);
+    if (!status)
+        return false;
+    const json_t *eye = json_object_get(json_object_get(status, "eye"), "eye_m");
+    pose->tilt_seen_deg =
+        json_number_value(json_object_get(json_object_get(status, "tilt"), "tilt_deg"));
+    pose->eye_seen = (struct vec3){json_number_value(json_array_get(eye, 0)),
+                                   json_number_value(json_array_get(eye, 1)),
+                                   json_number_value(json_array_get(eye, 2))};
+    json_decref(status);
+    return true;
+}
+
+static bool settle(struct session *s, struct pose_report *pose, struct error *err)
+{
+    double before = NAN;
+    for (int i = 0; i < 100; i++) {
+        if (!seen(s, pose, err))
+            return false;
+        if (fabs(pose->tilt_seen_deg - before) < 0.05 && i > 5)
+            return true;
+        before = pose->tilt_seen_deg;
+        clock_sleep_until_ns(clock_now_ns() + 100 * NS_PER_MS);
+    }
+    return fail(err, ERROR_RETRY, "the tilt did not settle");
+}
+
+static bool tilted(struct session *s, double tilt_deg, struct pose_report *pose, struct error *err)
+{
+    const struct lamp_report *lamp = &s->facts->lamps[s->facts->lamp_count - 1];
+    pose->moved_screen = true;
+    pose->tilt_deg = tilt_deg;
+    if (!bench_tilt(&s->bench, tilt_deg, err) || !settle(s, pose, err) ||
+        !measure_white(s, lamp, &pose->reference, &pose->measured, err))
+        return false;
+    pose->error_percent = 100 * (pose->measured.Y / pose->reference.Y - 1);
+    return true;
+}
+
+bool session_poses(struct session *s, struct error *err)
+{
+    struct session_facts *f = s->facts;
+    int tilts = sizeof POSE_TILTS_DEG / sizeof *POSE_TILTS_DEG;
+    int eyes = sizeof POSE_EYES / sizeof *POSE_EYES;
+    double rest_deg = s->settings.stand.default_tilt_deg;
+    struct vec3 eye = {s->settings.tracker.default_eye_m[0], s->settings.tracker.default_eye_m[1],
+                       s->settings.tracker.default_eye_m[2]};
+    for (int i = 0; i < tilts + 1; i++) {
+        struct pose_report *p = &f->poses[f->pose_count++];
+        p->eye = eye;
+        if (!tilted(s, i < tilts ? POSE_TILTS_DEG[i] : rest_deg, p, err))
+            return false;
+        bench_progress(&s->bench, "tilts", i + 1, tilts + 1);
+    }
+    for (int i = 0; i < eyes; i++) {
+        struct pose_report *p = &f->poses[f->pose_count++];
+        p->eye = POSE_EYES[i];
+        p->tilt_deg = rest_deg;
+        if (!bench_head(&s->bench, p->eye, err) || !settle(s, p, err))
+            return false;
+        bench_progress(&s->bench, "head", i + 1, eyes);
+    }
+    return bench_head(&s->bench, eye, err);
+}
