@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// A WitMotion WT901C-485 as its holding registers show it. See wires.md.
+#ifndef SIMULATOR_MODEL_WITMOTION_H
+#define SIMULATOR_MODEL_WITMOTION_H
+
+#include "simulator/around.h"
+#include "simulator/model_noise.h"
+
+enum { WITMOTION_ADDRESS = 0x50, WITMOTION_BAUD = 9600, WITMOTION_REGISTERS = 0x80 };
+
+struct witmotion {
+    struct around around;
+    struct noise noise;
+    int64_t powered_ns, unlocked_until_ns;
+    uint16_t registers[WITMOTION_REGISTERS];
+};
+
+// serial: up to 12 characters, kept in the registers 0x7A..0x7F (two a register).
+void witmotion_init(struct witmotion *device, const struct around *around, const char *serial,
+                    uint64_t seed, int64_t now_ns);
+
+// Measures: brings the registers up to now_ns.
+void witmotion_refresh(struct witmotion *device, int64_t now_ns);
+
+// One register written by the master: without effect while locked, or where
+// nothing may be written.
+void witmotion_write(struct witmotion *device, uint16_t address, uint16_t value, int64_t now_ns);
+
+#endif
