@@ -246,14 +246,14 @@ bool spectra_load(const char *path, bool held, struct spectra *out, struct error
     return true;
 }
 
-static bool is_path(const char *text)
+bool spectra_is_path(const char *text)
 {
     return strchr(text, '/') || ends_with(text, ".csv") || ends_with(text, ".sp");
 }
 
 bool lamp_spectrum(const char *name_or_path, struct spectrum *out, struct error *err)
 {
-    if (!is_path(name_or_path))
+    if (!spectra_is_path(name_or_path))
         return illuminant(name_or_path, out, err);
     struct spectra loaded = {0};
     if (!spectra_load(name_or_path, false, &loaded, err))

@@ -21,8 +21,11 @@ void spectra_fini(struct spectra *s);
 // misses 400..700 nm).
 bool spectra_load(const char *path, bool held, struct spectra *out, struct error *err);
 
-// One spectrum by CIE name (see colorimetry/illuminant.h) or, when the text
-// has a '/' or a '.' followed by csv or sp, from a file's first spectrum.
+// Whether a text means a file: it has a '/' or ends in .csv or .sp.
+bool spectra_is_path(const char *text);
+
+// One spectrum by CIE name (see colorimetry/illuminant.h) or from a file's
+// first spectrum, which must hold some light.
 bool lamp_spectrum(const char *name_or_path, struct spectrum *out, struct error *err);
 
 #endif

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// boothcal: measure, fit, teach, verify, report.
+#include <stdio.h>
+#include <string.h>
+
+#include "calibration/commands.h"
+
+static const struct command FAMILIES[] = {
+    {"colour", command_colour, "deltae|spectrum", "colour differences; colours of spectra"},
+    {NULL, NULL, NULL, NULL},
+};
+
+int main(int argc, char **argv)
+{
+    if (argc == 2 && !strcmp(argv[1], "--version")) {
+        printf("boothcal %s\n", BOOTHD_VERSION);
+        return COMMAND_FINE;
+    }
+    int code = command_run("boothcal", FAMILIES, argc, argv);
+    if (fflush(stdout) || ferror(stdout)) {
+        fprintf(stderr, "boothcal: standard output cannot be written\n");
+        return COMMAND_FAILED;
+    }
+    return code;
+}
