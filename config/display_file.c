@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "config/display_file.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "files/ini.h"
+
+// What the file holds: the model with its curves node by node.
+struct display_file {
+    char name[128];
+    double matrix[3][4];
+    double nodes[DISPLAY_NODES][3];
+    struct display_origin origin;
+    struct setting node_rows[DISPLAY_NODES + 1];
+    char node_names[DISPLAY_NODES][12];
+};
+
+#define TEXT(in, field, preset_text, sentence)                                                     \
+    {.name = #field, .type = SETTING_TEXT, .offset = SETTING_FIELD(in, field),                     \
+     .size = SETTING_SIZE(in, field), .unit = "", .preset = preset_text, .help = sentence}
+#define ROW(label, index)                                                                          \
+    {.name = label, .type = SETTING_VECTOR, .offset = index * 4 * sizeof(double), .size = 4,       \
+     .least = -1e6, .most = 1e6, .unit = "cd/m2",                                                  \
+     .help = "Tristimulus value of full red, green, blue and of black."}
+
+static const struct setting name_rows[] = {
+    TEXT(struct display_file, name, "", "Panel and serial number."),
+    {0},
+};
+
+static const struct setting matrix_rows[] = {ROW("X", 0), ROW("Y", 1), ROW("Z", 2), {0}};
+
+static const struct setting origin_rows[] = {
+    TEXT(struct display_origin, instrument, "", "Instrument that measured."),
+    TEXT(struct display_origin, date, "", "When it was measured or fitted."),
+    TEXT(struct display_origin, software, "", "Program that fitted."),
+    TEXT(struct display_origin, source, "", "File of measured patches."),
+    {.name = "patches", .type = SETTING_INT, .offset = SETTING_FIELD(struct display_origin, patches),
+     .least = 0, .most = 1e6, .unit = "", .preset = "0", .help = "Patches fitted."},
+    {.name = "fit_mean_de00", .type = SETTING_DOUBLE,
+     .offset = SETTING_FIELD(struct display_origin, fit_mean_de00), .least = 0, .most = 1000,
+     .unit = "", .preset = "0", .help = "Mean CIEDE2000 over the fitted patches."},
+    {.name = "fit_max_de00", .type = SETTING_DOUBLE,
+     .offset = SETTING_FIELD(struct display_origin, fit_max_de00), .least = 0, .most = 1000,
+     .unit = "", .preset = "0", .help = "Largest CIEDE2000 over the fitted patches."},
+    {0},
+};
+
+static struct display_file *file_create(struct error *err)
+{
+    struct display_file *file = calloc(1, sizeof *file);
+    if (!file) {
+        fail(err, ERROR_SYSTEM, "out of memory for a display model");
+        return NULL;
+    }
+    for (int k = 0; k < DISPLAY_NODES; k++) {
+        snprintf(file->node_names[k], sizeof file->node_names[k], "node_%04d", k);
+        file->node_rows[k] = (struct setting){
+            .name = file->node_names[k], .type = SETTING_VECTOR,
+            .offset = (size_t)k * sizeof file->nodes[0], .size = 3, .least = 0, .most = 1, .unit = "",
+            .help = "Linear light of red, green and blue at this 1020th of full code."};
+    }
+    return file;
+}
+
+static void sections_of(struct display_file *file, struct settings_section sections[5])
+{
+    sections[0] = (struct settings_section){"display", name_rows, file};
+    sections[1] = (struct settings_section){"origin", origin_rows, &file->origin};
+    sections[2] = (struct settings_section){"matrix", matrix_rows, file->matrix};
+    sections[3] = (struct settings_section){"curves", file->node_rows, file->nodes};
+    sections[4] = (struct settings_section){0};
+}
+
+// Other programs' texts may hold what an INI value cannot.
+static void make_plain(char *text)
+{
+    for (char *c = text; *c; c++)
+        if (*c < ' ' || *c > '~')
+            *c = '?';
+    size_t blanks = strspn(text, " ");
+    memmove(text, text + blanks, strlen(text + blanks) + 1);
+    for (size_t n = strlen(text); n && text[n - 1] == ' '; n--)
+        text[n - 1] = 0;
+}
+
+bool display_save(const char *path, const struct display_model *model,
+                  const struct display_origin *origin, struct error *err)
+{
+    struct settings_section sections[5];
+    struct display_file *file = file_create(err);
+    if (!file)
+        return false;
+    memcpy(file->name, model->name, sizeof file->name);
+    memcpy(file->matrix, model->matrix, sizeof file->matrix);
+    for (int k = 0; k < DISPLAY_NODES; k++)
+        for (int c = 0; c < 3; c++)
+            file->nodes[k][c] = model->curve[c][k];
+    file->origin = *origin;
+    char *texts[] = {file->name, file->origin.instrument, file->origin.date, file->origin.software,
+                     file->origin.source};
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
+        make_plain(texts[i]);
+    sections_of(file, sections);
+    bool saved = ini_save(path, sections, err);
+    free(file);
+    return saved;
+}
+
+bool display_load(const char *path, struct display_model *model, struct display_origin *origin,
+                  struct error *err)
+{
+    struct settings_section sections[5];
+    struct display_model loaded = {0};
+    struct display_file *file = file_create(err);
+    if (!file)
+        return false;
+    sections_of(file, sections);
+    bool fine = ini_load(path, sections, err);
+    memcpy(loaded.name, file->name, sizeof loaded.name);
+    memcpy(loaded.matrix, file->matrix, sizeof loaded.matrix);
+    for (int k = 0; k < DISPLAY_NODES; k++)
+        for (int c = 0; c < 3; c++)
+            loaded.curve[c][k] = file->nodes[k][c];
+    if (fine && !display_model_prepare(&loaded, err))
+        fine = while_doing(err, "%s: [curves] and [matrix]", path);
+    if (fine) {
+        *model = loaded;
+        if (origin)
+            *origin = file->origin;
+    }
+    free(file);
+    return fine;
+}
