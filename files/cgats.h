@@ -25,9 +25,12 @@ struct cgats {
 void cgats_fini(struct cgats *file);
 
 // Reads the first table; later tables (a .ti3's CAL) are checked for form and
-// left out. Refuses, naming file, line, key and what was expected: an
-// identifier that is missing, NUMBER_OF_FIELDS or NUMBER_OF_SETS that
-// contradicts the data, a duplicate field, a cell that is no finite number.
+// left out, as are foreign BEGIN_X..END_X blocks. Rows may wrap. Bytes that are
+// not UTF-8 come back as '?' in keyword values and labels. Refuses (DATA),
+// naming file, line, key and what was expected: an identifier that is missing,
+// NUMBER_OF_FIELDS or NUMBER_OF_SETS that contradicts the data (either may be
+// missing), a duplicate field, a cell that is no finite number, a keyword with
+// two values, a second table in a SPECT file, more than 4096 fields or keywords.
 bool cgats_load(const char *path, struct cgats *file, struct error *err);
 
 // As cgats_load, requiring an identifier such as "CTI3".
@@ -41,7 +44,9 @@ bool cgats_numbers(const struct cgats *file, const char *name, double *values, s
                    struct error *err);
 
 // Writes identifier, keywords (non-standard ones declared) and the table;
-// labels, if any, become SAMPLE_ID.
+// labels, if any, become SAMPLE_ID. NUMBER_OF_FIELDS and NUMBER_OF_SETS are not
+// keywords here: they follow from the table. Numbers are written so that they
+// read back to the same double. Refuses (RANGE) what cgats_load would refuse.
 bool cgats_save(const char *path, const struct cgats *file, struct error *err);
 
 #endif
