@@ -100,7 +100,7 @@ $(foreach p,$(PROGRAMS),$(eval $(call program_rule,$(p))))
 $(BUILD)/tests/whole/%: $(BUILD)/tests/whole/%.o $(call object,$(FAKES)) $(call archives,base files colorimetry) all
 	$(CC) -o $@ $< $(call object,$(FAKES)) $(call libs,base files colorimetry) -lcmocka
 
-$(call object,render/gl.c): $(BUILD)/render/shaders_embedded.inc
+$(call object,render/program.c): $(BUILD)/render/shaders_embedded.inc
 
 links: $(FOLDERS:%=$(BUILD)/links/%)
 

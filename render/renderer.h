@@ -13,18 +13,24 @@ struct renderer_options {
     bool fullscreen;   // on the monitor named below, else a plain undecorated window at 0, 0
     char monitor[128]; // name of the monitor, "" = the first
     int width, height; // of the window or of the off-screen image
+    int bits;          // 10 asks for a window of 10 bits a channel; else 8
 };
 
-// NULL with err (SYSTEM) when no context of OpenGL 3.3 can be had.
+// NULL with err (SYSTEM) when no context of OpenGL 3.3 can be had. One window
+// at a time in a process; any number on EGL.
 struct renderer *renderer_create(const struct renderer_options *options, struct error *err);
 void renderer_destroy(struct renderer *renderer); // accepts NULL
 
-// GL_RENDERER, and whether it is a software rasteriser.
+// GL_RENDERER, and for a fullscreen monitor whether its gamma ramp could be
+// made neutral.
 const char *renderer_name(const struct renderer *renderer);
 
 // Draws the scene and presents it; when it returns true the frame has been
-// handed to the display (glFinish done). A scene equal to the last one is not
-// drawn again unless forced. *drawn may be NULL.
+// handed to the display (glFinish done, and answered by the X server). A scene
+// equal to the last one is not drawn again unless forced. *drawn may be NULL.
+// The screen of a SURFACE scene must have the renderer's size (else RANGE).
+// Codes have scene.bits, or fewer where the window has fewer. A value that is
+// not finite is shown as 0.
 bool renderer_show(struct renderer *renderer, const struct scene *scene, bool force, bool *drawn,
                    struct error *err);
 

@@ -33,8 +33,9 @@ struct scene {
     const float *texels; // [height][width][3] relative XYZ, Y = 1 for the perfect diffuser
     int texels_width, texels_height;
     uint64_t texels_generation;
-    struct vec3 texel_offset; // x, y in 0..1 of the material shown at the screen's centre,
-    double texel_scale_x;     // metres of screen a full material width covers
+    struct vec3 texel_offset; // x, y in 0..1 (y from the top) of the material shown at the
+                              // screen's centre
+    double texel_scale_x;     // metres of screen a full material width covers, > 0
     double texel_scale_y;     // likewise its height
 
     struct xyz white;          // relative XYZ of the perfect diffuser under the lamp, Y = 1
@@ -53,5 +54,10 @@ struct pixel {
     struct xyz emitted;      // surface less the screen's own reflection
     struct display_inverse inverse;
 };
+
+// The nearest texel of a SURFACE scene at a pixel's column or row, -1 outside
+// the material: there the screen is black and nothing is out of gamut.
+int scene_texel_column(const struct scene *scene, int x_px);
+int scene_texel_row(const struct scene *scene, int y_px);
 
 #endif

@@ -1,0 +1,498 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <epoxy/gl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "render/context.h"
+#include "render/dither.h"
+#include "render/program.h"
+#include "render/renderer.h"
+
+// A texture's number is also its unit.
+enum texture { LIGHTS, ILLUMINANCE, TEXELS, PLACES, CURVES, RANKS, EMITTED, COUNTS, TEXTURE_COUNT };
+
+static const char *const SAMPLERS[] = {
+    [LIGHTS] = "lights", [ILLUMINANCE] = "illuminance", [TEXELS] = "texels",
+    [PLACES] = "places", [CURVES] = "curves",           [RANKS] = "ranks",
+};
+
+enum { LIGHTS_A_ROW = 64 };
+
+// In linear light; below it single precision cannot tell.
+static const float GAMUT_TOLERANCE = 1e-6f;
+
+struct renderer {
+    struct context *context;
+    int width, height;
+    char name[256];
+    GLuint vertices, light_program, frame_program, light_target, frame_target;
+    GLuint textures[TEXTURE_COUNT];
+    int code_bits;     // of the counts texture
+    struct scene last; // what is shown
+    bool shown;        // last is valid
+    struct scene seen; // the inputs that lights, texels and curves were last made from
+    bool seen_lights, seen_places, seen_texels, seen_display;
+    bool surface;   // a SURFACE frame has been drawn
+    double outside; // its share out of gamut, < 0 when not counted yet
+};
+
+// ---- set-up ----------------------------------------------------------------
+
+static void upload(struct renderer *r, enum texture which, GLint inner, int width, int height,
+                   GLenum format, GLenum type, const void *data)
+{
+    glActiveTexture(GL_TEXTURE0 + which);
+    glBindTexture(GL_TEXTURE_2D, r->textures[which]);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
+    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAX_LEVEL, 0);
+    glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+    glTexImage2D(GL_TEXTURE_2D, 0, inner, width, height, 0, format, type, data);
+}
+
+static void upload_ranks(struct renderer *r)
+{
+    uint16_t ranks[DITHER_LEVELS];
+    dither_tile(ranks);
+    upload(r, RANKS, GL_R16I, DITHER_SIDE, DITHER_SIDE, GL_RED_INTEGER, GL_SHORT, ranks);
+}
+
+static void name_samplers(GLuint program)
+{
+    glUseProgram(program);
+    for (size_t i = 0; i < sizeof SAMPLERS / sizeof SAMPLERS[0]; i++)
+        glUniform1i(glGetUniformLocation(program, SAMPLERS[i]), (GLint)i);
+}
+
+static bool complete(struct error *err)
+{
+    GLenum status = glCheckFramebufferStatus(GL_FRAMEBUFFER);
+    return status == GL_FRAMEBUFFER_COMPLETE ||
+           fail(err, ERROR_SYSTEM, "OpenGL: frame buffer incomplete: 0x%x", status);
+}
+
+static void attach(int place, GLuint texture)
+{
+    glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0 + place, GL_TEXTURE_2D, texture, 0);
+}
+
+static bool size_counts(struct renderer *r, int bits, struct error *err)
+{
+    if (r->code_bits == bits)
+        return true;
+    upload(r, COUNTS, bits == 10 ? GL_RGB10_A2 : GL_RGBA8, r->width, r->height, GL_RGBA,
+           GL_UNSIGNED_BYTE, NULL);
+    glBindFramebuffer(GL_FRAMEBUFFER, r->frame_target);
+    attach(0, r->textures[EMITTED]);
+    attach(1, r->textures[COUNTS]);
+    glDrawBuffers(2, (GLenum[]){GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1});
+    r->code_bits = bits;
+    return complete(err);
+}
+
+static bool set_up(struct renderer *r, struct error *err)
+{
+    GLint most = 0;
+    glGetIntegerv(GL_MAX_TEXTURE_SIZE, &most);
+    if (r->width < 1 || r->height < 1 || r->width > most || r->height > most)
+        return fail(err, ERROR_RANGE, "screen of %d x %d pixels: this OpenGL allows 1..%d",
+                    r->width, r->height, most);
+    r->light_program = program_make("light.frag.glsl", err);
+    r->frame_program = r->light_program ? program_make("frame.frag.glsl", err) : 0;
+    if (!r->frame_program)
+        return false;
+    name_samplers(r->light_program);
+    name_samplers(r->frame_program);
+    glGenVertexArrays(1, &r->vertices);
+    glBindVertexArray(r->vertices);
+    glGenTextures(TEXTURE_COUNT, r->textures);
+    glGenFramebuffers(1, &r->light_target);
+    glGenFramebuffers(1, &r->frame_target);
+    upload_ranks(r);
+    upload(r, ILLUMINANCE, GL_R32F, r->width, r->height, GL_RED, GL_FLOAT, NULL);
+    upload(r, EMITTED, GL_RGBA32F, r->width, r->height, GL_RGBA, GL_FLOAT, NULL);
+    glBindFramebuffer(GL_FRAMEBUFFER, r->light_target);
+    attach(0, r->textures[ILLUMINANCE]);
+    return complete(err) && size_counts(r, 8, err);
+}
+
+struct renderer *renderer_create(const struct renderer_options *options, struct error *err)
+{
+    struct renderer *r = calloc(1, sizeof *r);
+    if (!r) {
+        fail(err, ERROR_SYSTEM, "no memory for a renderer");
+        return NULL;
+    }
+    r->width = options->width;
+    r->height = options->height;
+    r->context = options->window ? window_open(options, err) : headless_open(err);
+    if (!r->context || !set_up(r, err)) {
+        renderer_destroy(r);
+        return NULL;
+    }
+    snprintf(r->name, sizeof r->name, "%s%s%s", (const char *)glGetString(GL_RENDERER),
+             r->context->note[0] ? ", " : "", r->context->note);
+    return r;
+}
+
+void renderer_destroy(struct renderer *r)
+{
+    if (!r)
+        return;
+    if (r->context && r->context->use(r->context, NULL)) {
+        glDeleteProgram(r->light_program);
+        glDeleteProgram(r->frame_program);
+        glDeleteTextures(TEXTURE_COUNT, r->textures);
+        glDeleteFramebuffers(1, &r->light_target);
+        glDeleteFramebuffers(1, &r->frame_target);
+        glDeleteVertexArrays(1, &r->vertices);
+    }
+    if (r->context)
+        r->context->close(r->context);
+    free(r);
+}
+
+const char *renderer_name(const struct renderer *r)
+{
+    return r->name;
+}
+
+// ---- stages: each does its work when its inputs change ----------------------
+
+static bool same_lights(const struct scene *a, const struct scene *b)
+{
+    return a->lights == b->lights && a->lights_generation == b->lights_generation &&
+           memcmp(&a->booth_from_screen, &b->booth_from_screen, sizeof a->booth_from_screen) == 0 &&
+           memcmp(&a->screen, &b->screen, sizeof a->screen) == 0;
+}
+
+static bool same_places(const struct scene *a, const struct scene *b)
+{
+    return memcmp(&a->screen, &b->screen, sizeof a->screen) == 0 &&
+           a->texels_width == b->texels_width && a->texels_height == b->texels_height &&
+           a->texel_offset.x == b->texel_offset.x && a->texel_offset.y == b->texel_offset.y &&
+           a->texel_scale_x == b->texel_scale_x && a->texel_scale_y == b->texel_scale_y;
+}
+
+static bool same_texels(const struct scene *a, const struct scene *b)
+{
+    return a->texels == b->texels && a->texels_generation == b->texels_generation &&
+           a->texels_width == b->texels_width && a->texels_height == b->texels_height;
+}
+
+static bool same_display(const struct scene *a, const struct scene *b)
+{
+    return a->display == b->display && a->display_generation == b->display_generation;
+}
+
+static bool same_scene(const struct scene *a, const struct scene *b)
+{
+    if (a->kind != b->kind || a->bits != b->bits)
+        return false;
+    switch (a->kind) {
+    case SCENE_DARK:
+        return true;
+    case SCENE_PATCH:
+        return a->patch.r == b->patch.r && a->patch.g == b->patch.g && a->patch.b == b->patch.b;
+    case SCENE_SURFACE:
+        break;
+    }
+    return same_lights(a, b) && same_places(a, b) && same_texels(a, b) && same_display(a, b) &&
+           a->level == b->level && a->dither == b->dither &&
+           a->screen_reflectance == b->screen_reflectance && a->white.X == b->white.X &&
+           a->white.Y == b->white.Y && a->white.Z == b->white.Z;
+}
+
+static void draw(GLuint program, GLuint target, int width, int height)
+{
+    glBindFramebuffer(GL_FRAMEBUFFER, target);
+    glViewport(0, 0, width, height);
+    glUseProgram(program);
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+}
+
+static GLint at(GLuint program, const char *uniform)
+{
+    return glGetUniformLocation(program, uniform);
+}
+
+static int upload_lights(struct renderer *r, const struct scene *scene)
+{
+    struct rigid screen_from_booth = rigid_inverse(scene->booth_from_screen);
+    int count = scene->lights ? scene->lights->count : 0;
+    int rows = count / LIGHTS_A_ROW + 1;
+    float(*packed)[4] = calloc((size_t)rows * LIGHTS_A_ROW, sizeof *packed);
+    if (!packed)
+        return -1;
+    for (int i = 0; i < count; i++) {
+        struct vec3 place = rigid_apply(screen_from_booth, scene->lights->points[i].at);
+        packed[i][0] = (float)place.x;
+        packed[i][1] = (float)place.y;
+        packed[i][2] = (float)place.z;
+        packed[i][3] = (float)scene->lights->points[i].intensity_cd;
+    }
+    upload(r, LIGHTS, GL_RGBA32F, LIGHTS_A_ROW, rows, GL_RGBA, GL_FLOAT, packed);
+    free(packed);
+    return count;
+}
+
+static bool light_stage(struct renderer *r, const struct scene *scene, struct error *err)
+{
+    if (r->seen_lights && same_lights(&r->seen, scene))
+        return true;
+    GLuint program = r->light_program;
+    const struct screen *s = &scene->screen;
+    struct mat3 turn = mat3_transpose(scene->booth_from_screen.rotation);
+    struct vec3 down = mat3_apply(turn, (struct vec3){0, -1, 0});
+    int count = upload_lights(r, scene);
+    if (count < 0)
+        return fail(err, ERROR_SYSTEM, "no memory for the light points");
+    glUseProgram(program);
+    glUniform1i(at(program, "light_count"), count);
+    glUniform3f(at(program, "down"), (float)down.x, (float)down.y, (float)down.z);
+    glUniform2f(at(program, "pixel_m"), (float)(s->width_m / s->width_px),
+                (float)(s->height_m / s->height_px));
+    glUniform2f(at(program, "corner_m"), (float)(-s->width_m / 2), (float)(-s->height_m / 2));
+    draw(program, r->light_target, r->width, r->height);
+    return true;
+}
+
+static bool place_stage(struct renderer *r, const struct scene *scene, struct error *err)
+{
+    if (r->seen_places && same_places(&r->seen, scene))
+        return true;
+    int longest = r->width > r->height ? r->width : r->height;
+    int32_t *places = calloc(2 * (size_t)longest, sizeof *places);
+    if (!places)
+        return fail(err, ERROR_SYSTEM, "no memory for %d places", longest);
+    for (int x = 0; x < r->width; x++)
+        places[x] = scene_texel_column(scene, x);
+    for (int y = 0; y < r->height; y++)
+        places[longest + y] = scene_texel_row(scene, y);
+    upload(r, PLACES, GL_R32I, longest, 2, GL_RED_INTEGER, GL_INT, places);
+    free(places);
+    return true;
+}
+
+static bool texel_stage(struct renderer *r, const struct scene *scene, struct error *err)
+{
+    GLint most = 0;
+    glGetIntegerv(GL_MAX_TEXTURE_SIZE, &most);
+    if (r->seen_texels && same_texels(&r->seen, scene))
+        return true;
+    if (scene->texels_width > most || scene->texels_height > most)
+        return fail(err, ERROR_RANGE, "material of %d x %d texels: this OpenGL allows %d a side",
+                    scene->texels_width, scene->texels_height, most);
+    upload(r, TEXELS, GL_RGB32F, scene->texels_width, scene->texels_height, GL_RGB, GL_FLOAT,
+           scene->texels);
+    return true;
+}
+
+static void display_stage(struct renderer *r, const struct scene *scene)
+{
+    if (r->seen_display && same_display(&r->seen, scene))
+        return;
+    const struct display_model *model = scene->display;
+    float curves[3][DISPLAY_NODES], rows[3][3];
+    struct xyz black = display_black(model);
+    for (int c = 0; c < 3; c++) {
+        for (int k = 0; k < DISPLAY_NODES; k++)
+            curves[c][k] = (float)model->curve[c][k];
+        for (int k = 0; k < 3; k++)
+            rows[c][k] = (float)model->inverse[c][k];
+    }
+    upload(r, CURVES, GL_R32F, DISPLAY_NODES, 3, GL_RED, GL_FLOAT, curves);
+    glUseProgram(r->frame_program);
+    glUniform3fv(at(r->frame_program, "from_xyz"), 3, rows[0]);
+    glUniform3f(at(r->frame_program, "black"), (float)black.X, (float)black.Y, (float)black.Z);
+}
+
+static void frame_stage(struct renderer *r, const struct scene *scene)
+{
+    GLuint program = r->frame_program;
+    glUseProgram(program);
+    glUniform1f(at(program, "level"), (float)scene->level);
+    glUniform3f(at(program, "white"), (float)scene->white.X, (float)scene->white.Y,
+                (float)scene->white.Z);
+    glUniform1f(at(program, "screen_reflectance"), (float)scene->screen_reflectance);
+    glUniform1f(at(program, "code_most"), (float)((1 << r->code_bits) - 1));
+    glUniform1i(at(program, "dithered"), scene->dither);
+    glUniform1i(at(program, "height"), r->height);
+    glUniform1f(at(program, "tolerance"), GAMUT_TOLERANCE);
+    draw(program, r->frame_target, r->width, r->height);
+    r->surface = true;
+    r->outside = -1;
+}
+
+static bool draw_surface(struct renderer *r, const struct scene *scene, struct error *err)
+{
+    const struct screen *s = &scene->screen;
+    if (s->width_px != r->width || s->height_px != r->height)
+        return fail(err, ERROR_RANGE, "a scene of %d x %d pixels on a screen of %d x %d",
+                    s->width_px, s->height_px, r->width, r->height);
+    if (!scene->texels || !scene->display)
+        return fail(err, ERROR_CONFIG, "no %s to show a surface with",
+                    scene->texels ? "display model" : "material");
+    bool good = light_stage(r, scene, err) && place_stage(r, scene, err) &&
+                texel_stage(r, scene, err);
+    r->seen_lights = r->seen_places = r->seen_texels = r->seen_display = good;
+    if (!good)
+        return false;
+    display_stage(r, scene);
+    r->seen = *scene;
+    frame_stage(r, scene);
+    return true;
+}
+
+// Half a code goes up; what is not a number is black.
+static float whole_code(double count, int most)
+{
+    double clamped = count > 0 ? count < 1 ? count : 1 : 0;
+    return (float)(floor(clamped * most + 0.5) / most);
+}
+
+static void draw_uniform(struct renderer *r, struct counts patch)
+{
+    int most = (1 << r->code_bits) - 1;
+    float rgba[4] = {whole_code(patch.r, most), whole_code(patch.g, most),
+                     whole_code(patch.b, most), 1};
+    glBindFramebuffer(GL_FRAMEBUFFER, r->frame_target);
+    glClearBufferfv(GL_COLOR, 1, rgba);
+}
+
+static void present(struct renderer *r)
+{
+    if (r->context->window_bits > 0) {
+        glBindFramebuffer(GL_READ_FRAMEBUFFER, r->frame_target);
+        glReadBuffer(GL_COLOR_ATTACHMENT1);
+        glBindFramebuffer(GL_DRAW_FRAMEBUFFER, 0);
+        glBlitFramebuffer(0, 0, r->width, r->height, 0, 0, r->width, r->height,
+                          GL_COLOR_BUFFER_BIT, GL_NEAREST);
+    }
+    r->context->present(r->context);
+    glFinish();
+}
+
+static int bits_of(const struct renderer *r, const struct scene *scene)
+{
+    bool deep = scene->bits == 10 && (r->context->window_bits == 0 || r->context->window_bits >= 10);
+    return deep ? 10 : 8;
+}
+
+bool renderer_show(struct renderer *r, const struct scene *scene, bool force, bool *drawn,
+                   struct error *err)
+{
+    bool again = force || !r->shown || !same_scene(&r->last, scene);
+    if (drawn)
+        *drawn = again;
+    if (!again)
+        return true;
+    r->shown = false;
+    if (!r->context->use(r->context, err) || !size_counts(r, bits_of(r, scene), err))
+        return false;
+    switch (scene->kind) {
+    case SCENE_DARK:
+        draw_uniform(r, (struct counts){0, 0, 0});
+        break;
+    case SCENE_PATCH:
+        draw_uniform(r, scene->patch);
+        break;
+    case SCENE_SURFACE:
+        if (!draw_surface(r, scene, err))
+            return false;
+        break;
+    }
+    present(r);
+    GLenum code = glGetError();
+    if (code != GL_NO_ERROR) {
+        r->seen_lights = r->seen_places = r->seen_texels = r->seen_display = false;
+        return fail(err, ERROR_SYSTEM, "OpenGL: error 0x%x", code);
+    }
+    r->last = *scene;
+    r->shown = true;
+    return true;
+}
+
+bool renderer_events(struct renderer *r, double timeout_s)
+{
+    bool open = r->context->events(r->context, timeout_s);
+    if (open && r->context->damaged && r->shown && r->context->use(r->context, NULL))
+        present(r);
+    return open;
+}
+
+// ---- reading back ----------------------------------------------------------
+
+static void flip_rows(void *pixels, size_t row_bytes, int rows)
+{
+    unsigned char *top = pixels, *bottom = top + row_bytes * (rows - 1);
+    for (; top < bottom; top += row_bytes, bottom -= row_bytes)
+        for (size_t i = 0; i < row_bytes; i++) {
+            unsigned char kept = top[i];
+            top[i] = bottom[i];
+            bottom[i] = kept;
+        }
+}
+
+static void *read_back(struct renderer *r, int place, GLenum format, GLenum type,
+                       size_t pixel_bytes, struct error *err)
+{
+    size_t row_bytes = pixel_bytes * r->width;
+    void *pixels = malloc(row_bytes * r->height);
+    if (!pixels) {
+        fail(err, ERROR_SYSTEM, "no memory for %d x %d pixels", r->width, r->height);
+        return NULL;
+    }
+    if (!r->context->use(r->context, err)) {
+        free(pixels);
+        return NULL;
+    }
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, r->frame_target);
+    glReadBuffer(GL_COLOR_ATTACHMENT0 + place);
+    glPixelStorei(GL_PACK_ALIGNMENT, 1);
+    glReadPixels(0, 0, r->width, r->height, format, type, pixels);
+    GLenum code = glGetError();
+    if (code != GL_NO_ERROR) {
+        free(pixels);
+        fail(err, ERROR_SYSTEM, "OpenGL: reading back: error 0x%x", code);
+        return NULL;
+    }
+    flip_rows(pixels, row_bytes, r->height);
+    return pixels;
+}
+
+uint8_t *renderer_counts(struct renderer *r, struct error *err)
+{
+    if (!r->shown) {
+        fail(err, ERROR_RETRY, "no frame has been shown");
+        return NULL;
+    }
+    return read_back(r, 1, GL_RGB, GL_UNSIGNED_BYTE, 3, err);
+}
+
+float *renderer_xyz(struct renderer *r, struct error *err)
+{
+    if (!r->surface) {
+        fail(err, ERROR_RETRY, "no surface has been shown");
+        return NULL;
+    }
+    return read_back(r, 0, GL_RGB, GL_FLOAT, 3 * sizeof(float), err);
+}
+
+double renderer_out_of_gamut(struct renderer *r)
+{
+    if (!r->surface)
+        return 0;
+    if (r->outside >= 0)
+        return r->outside;
+    float(*pixels)[4] = read_back(r, 0, GL_RGBA, GL_FLOAT, sizeof *pixels, NULL);
+    if (!pixels)
+        return 0;
+    size_t count = (size_t)r->width * r->height, outside = 0;
+    for (size_t i = 0; i < count; i++)
+        outside += pixels[i][3] > 0.5f;
+    free(pixels);
+    r->outside = (double)outside / count;
+    return r->outside;
+}
