@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/number.h"
+
 static void *field_of(const struct setting *row, void *target)
 {
     return (char *)target + row->offset;
@@ -137,9 +139,10 @@ bool settings_set(const struct setting *rows, void *target, const char *name, co
 void settings_get(const struct setting *row, const void *target, char *text, size_t size)
 {
     const void *field = (const char *)target + row->offset;
+    char shown[NUMBER_TEXT];
     switch (row->type) {
     case SETTING_DOUBLE:
-        snprintf(text, size, "%.17g", *(const double *)field);
+        snprintf(text, size, "%s", number_text(shown, *(const double *)field));
         return;
     case SETTING_INT:
         snprintf(text, size, "%d", *(const int *)field);
@@ -156,8 +159,8 @@ void settings_get(const struct setting *row, const void *target, char *text, siz
     case SETTING_VECTOR:
         *text = 0;
         for (size_t i = 0, used = 0; i < row->size && used < size; i++)
-            used += snprintf(text + used, size - used, "%s%.17g", i ? " " : "",
-                             ((const double *)field)[i]);
+            used += snprintf(text + used, size - used, "%s%s", i ? " " : "",
+                             number_text(shown, ((const double *)field)[i]));
         return;
     }
 }

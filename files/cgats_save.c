@@ -2,9 +2,9 @@
 #include "files/cgats.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
+#include "base/number.h"
 #include "files/text.h"
 #include "files/write.h"
 
@@ -107,18 +107,6 @@ static void write_label(FILE *out, const char *label)
         write_quoted(out, label);
 }
 
-// The shortest text that reads back to the same double.
-static void write_number(FILE *out, double value)
-{
-    char text[32];
-    for (int digits = 6; digits <= 17; digits++) {
-        snprintf(text, sizeof text, "%.*g", digits, value);
-        if (strtod(text, NULL) == value)
-            break;
-    }
-    fputs(text, out);
-}
-
 static void write_heads(const struct cgats *file, FILE *out)
 {
     const struct table *t = &file->table;
@@ -138,6 +126,7 @@ static void write_heads(const struct cgats *file, FILE *out)
 
 static void write_table(const struct table *t, FILE *out)
 {
+    char shown[NUMBER_TEXT];
     bool lead = t->labels && table_column(t, "SAMPLE_ID") < 0;
     fprintf(out, "\nNUMBER_OF_FIELDS %zu\nBEGIN_DATA_FORMAT\n%s", t->columns + lead,
             lead ? "SAMPLE_ID " : "");
@@ -152,7 +141,7 @@ static void write_table(const struct table *t, FILE *out)
             if (is_label(t, c))
                 write_label(out, t->labels[r]);
             else
-                write_number(out, table_at(t, r, c));
+                fputs(number_text(shown, table_at(t, r, c)), out);
         }
         fputc('\n', out);
     }
