@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/head.h"
+
+#include <complex.h>
+#include <math.h>
+
+static const struct vec3 models[][POSE_POINTS] = {
+    {{0, 0.040, -0.030}, {0, 0, 0}, {0, -0.070, -0.080}},               // clip: top, middle, bottom
+    {{0, 0, 0}, {-0.040, -0.060, -0.100}, {0.040, -0.060, -0.100}},     // cap: top, left, right
+};
+
+static const double nearest_m = 0.15, farthest_m = 3;
+static const double most_residual_px = 4;
+static const double most_turn = 75 * M_PI / 180;   // from facing the camera, any axis
+static const double most_unlike = 0.25;            // of the blobs' shape, 0..1
+static const double pull_per_m = 5;                // rad of rotation a metre is worth
+static const double alike = 0.1;                   // rad
+static const double same_eye_m = 0.015;
+static const double jump_m = 0.10, speed_m_s = 3;  // faster is no head
+static const int64_t memory_ns = NS_PER_S;
+enum { JUMPS_BELIEVED = 3, CANDIDATES = POSE_MOST + 1 };
+
+const struct vec3 *head_markers(int marker)
+{
+    return models[marker];
+}
+
+// How far three blobs differ in shape from three projected markers, place,
+// size and a turn within the image set aside: 0 alike .. 1; 1 when turned too far.
+static double unlikeness(const double complex seen[POSE_POINTS],
+                         const double complex model[POSE_POINTS])
+{
+    double complex seen_mean = 0, model_mean = 0, product = 0;
+    double seen_size = 0, model_size = 0;
+    for (int i = 0; i < POSE_POINTS; i++) {
+        seen_mean += seen[i] / POSE_POINTS;
+        model_mean += model[i] / POSE_POINTS;
+    }
+    for (int i = 0; i < POSE_POINTS; i++) {
+        double complex a = seen[i] - seen_mean, b = model[i] - model_mean;
+        product += a * conj(b);
+        seen_size += creal(a * conj(a));
+        model_size += creal(b * conj(b));
+    }
+    if (seen_size <= 0 || fabs(carg(product)) > most_turn)
+        return 1;
+    return 1 - creal(product * conj(product)) / (seen_size * model_size);
+}
+
+// A head upright at about arm's length that faces the camera along the ray to
+// the blobs: what to expect when nothing is known.
+static struct rigid facing(const double (*image)[2])
+{
+    double x = 0, y = 0;
+    for (int i = 0; i < POSE_POINTS; i++) {
+        x += image[i][0] / POSE_POINTS;
+        y += image[i][1] / POSE_POINTS;
+    }
+    struct vec3 z = vec3_unit((struct vec3){x, y, 1});
+    struct vec3 right = vec3_unit(vec3_cross((struct vec3){0, 1, 0}, z));
+    struct vec3 up = vec3_cross(z, right);
+    return (struct rigid){{{{right.x, up.x, z.x}, {right.y, up.y, z.y}, {right.z, up.z, z.z}}},
+                          vec3_scale(z, 0.7)};
+}
+
+// Orders blobs as the markers; returns the unlikeness of the best order.
+static double assign(const struct head_memory *memory, const struct vec3 *markers,
+                     const double (*blobs)[2], int count, double image[POSE_POINTS][2])
+{
+    double complex expected[POSE_POINTS], b[HEAD_BLOBS];
+    double best = 1;
+    struct rigid pose = memory->known ? memory->pose : facing(blobs);
+    for (int i = 0; i < POSE_POINTS; i++) {
+        struct vec3 p = rigid_apply(pose, markers[i]);
+        expected[i] = p.x / p.z + I * (p.y / p.z);
+    }
+    for (int i = 0; i < count; i++)
+        b[i] = blobs[i][0] + I * blobs[i][1];
+    for (int order = 0; order < count * count * count; order++) {
+        int at[POSE_POINTS] = {order % count, order / count % count, order / count / count};
+        if (at[0] == at[1] || at[1] == at[2] || at[0] == at[2])
+            continue;
+        double unlike = unlikeness((double complex[]){b[at[0]], b[at[1]], b[at[2]]}, expected);
+        if (unlike >= best)
+            continue;
+        best = unlike;
+        for (int i = 0; i < POSE_POINTS; i++) {
+            image[i][0] = blobs[at[i]][0];
+            image[i][1] = blobs[at[i]][1];
+        }
+    }
+    return best;
+}
+
+// Root mean square distance between blobs and projected markers.
+static double residual(const struct vec3 *markers, const double image[POSE_POINTS][2],
+                       const struct rigid *pose)
+{
+    double sum = 0;
+    for (int i = 0; i < POSE_POINTS; i++) {
+        struct vec3 p = rigid_apply(*pose, markers[i]);
+        if (!(p.z > 0))
+            return INFINITY;
+        sum += pow(p.x / p.z - image[i][0], 2) + pow(p.y / p.z - image[i][1], 2);
+    }
+    return sqrt(sum / POSE_POINTS);
+}
+
+static double angle_between(struct mat3 a, struct mat3 b)
+{
+    struct mat3 turn = mat3_mul(mat3_transpose(a), b);
+    double cosine = (turn.m[0][0] + turn.m[1][1] + turn.m[2][2] - 1) / 2;
+    return acos(fmin(fmax(cosine, -1), 1));
+}
+
+struct choice {
+    struct rigid pose;
+    double cost; // rad
+};
+
+static bool plausible(const struct rigid *pose, const struct rigid *front, double residual_px)
+{
+    return residual_px <= most_residual_px && pose->translation.z >= nearest_m &&
+           pose->translation.z <= farthest_m &&
+           angle_between(pose->rotation, front->rotation) <= most_turn;
+}
+
+static double cost_of(const struct head_memory *memory, const struct rigid *pose,
+                      const struct rigid *front)
+{
+    if (!memory->known)
+        return angle_between(pose->rotation, front->rotation);
+    struct vec3 moved = vec3_sub(pose->translation, memory->pose.translation);
+    return angle_between(pose->rotation, memory->pose.rotation) + pull_per_m * vec3_length(moved);
+}
+
+// The plausible poses, cheapest first.
+static int choose(const struct head_memory *memory, const struct vec3 *markers,
+                  const double image[POSE_POINTS][2], double focal_px,
+                  struct choice choices[CANDIDATES])
+{
+    struct rigid found[CANDIDATES], front = facing(image);
+    int count = pose_candidates(markers, image, found), kept = 0;
+    found[count++] = memory->known ? memory->pose : front;
+    for (int i = 0; i < count; i++) {
+        if (!pose_refine(markers, image, &found[i]) ||
+            !plausible(&found[i], &front, focal_px * residual(markers, image, &found[i])))
+            continue;
+        struct choice one = {found[i], cost_of(memory, &found[i], &front)};
+        int at = kept++;
+        for (; at > 0 && choices[at - 1].cost > one.cost; at--)
+            choices[at] = choices[at - 1];
+        choices[at] = one;
+    }
+    return kept;
+}
+
+static bool undecided(const struct choice *choices, int count, struct vec3 eye_from_marker)
+{
+    struct vec3 eye = rigid_apply(choices[0].pose, eye_from_marker);
+    for (int i = 1; i < count; i++) {
+        struct vec3 other = rigid_apply(choices[i].pose, eye_from_marker);
+        if (choices[i].cost - choices[0].cost < alike &&
+            vec3_length(vec3_sub(other, eye)) > same_eye_m)
+            return true;
+    }
+    return false;
+}
+
+static bool jumped(struct head_memory *memory, struct vec3 moved, int64_t now_ns)
+{
+    double seconds = (double)(now_ns - memory->seen_ns) / NS_PER_S;
+    if (!memory->known || vec3_length(moved) <= jump_m + speed_m_s * seconds)
+        return false;
+    return ++memory->jumps <= JUMPS_BELIEVED;
+}
+
+void head_solve(struct head_memory *memory, const struct vec3 *markers, struct vec3 eye_from_marker,
+                const double (*blobs)[2], int count, double focal_px, int64_t now_ns,
+                struct head_sample *out)
+{
+    double image[POSE_POINTS][2];
+    struct choice choices[CANDIDATES];
+    out->markers = count;
+    out->eye = (struct vec3){0, 0, 0};
+    out->reprojection_px = 0;
+    out->status = TRACKER_LOST;
+    if (now_ns - memory->seen_ns > memory_ns)
+        *memory = (struct head_memory){0};
+    if (count < POSE_POINTS || assign(memory, markers, blobs, count, image) > most_unlike)
+        return;
+    out->status = TRACKER_AMBIGUOUS;
+    int found = choose(memory, markers, image, focal_px, choices);
+    if (!found || undecided(choices, found, eye_from_marker))
+        return;
+    struct rigid pose = choices[0].pose;
+    out->reprojection_px = focal_px * residual(markers, image, &pose);
+    if (jumped(memory, vec3_sub(pose.translation, memory->pose.translation), now_ns))
+        return;
+    *memory = (struct head_memory){true, pose, now_ns, 0};
+    out->eye = rigid_apply(pose, eye_from_marker);
+    out->status = TRACKER_SEEN;
+}

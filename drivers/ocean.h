@@ -1,0 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
+// The driver of Ocean Optics USB2000+ and Flame-S; see ocean.md.
+#ifndef DRIVERS_OCEAN_H
+#define DRIVERS_OCEAN_H
+
+#include "drivers/spectrometer.h"
+
+extern const struct spectrometer_driver ocean_driver;
+
+#endif

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/spectrometer.h"
+
+#include "drivers/ocean.h"
+
+#define FIELD(name) SETTING_FIELD(struct spectrometer_options, name)
+#define SIZE(name) SETTING_SIZE(struct spectrometer_options, name)
+
+const char *spectrometer_status_name(enum spectrometer_status status)
+{
+    switch (status) {
+#define X(name, text)                                                                              \
+    case SPECTROMETER_##name:                                                                      \
+        return text;
+        SPECTROMETER_STATUSES(X)
+#undef X
+    }
+    return "unknown";
+}
+
+const struct setting spectrometer_settings[] = {
+    {"serial", SETTING_TEXT, FIELD(serial), SIZE(serial), .unit = "", .preset = "",
+     .help = "Serial number of the spectrometer; empty takes the first one found."},
+    {"calibration", SETTING_TEXT, FIELD(calibration), SIZE(calibration), .unit = "", .preset = "",
+     .help = "CSV file \"nm,uJ_per_count\" of this very unit and its cosine corrector."},
+    {"collector_mm2", SETTING_DOUBLE, FIELD(collector_mm2), .least = 0.01, .most = 10000,
+     .unit = "mm2", .preset = "11.95", .help = "Area of the cosine corrector."},
+    {"mains_hz", SETTING_DOUBLE, FIELD(mains_hz), .least = 50, .most = 60, .unit = "Hz",
+     .preset = "50", .help = "Exposures of half a mains period and more are its multiples."},
+    {"integration_us", SETTING_INT, FIELD(integration_us), .least = 1000, .most = 65535000,
+     .unit = "us", .preset = "100000", .help = "First exposure; later ones follow the light."},
+    {"average", SETTING_INT, FIELD(average), .least = 1, .most = 100, .unit = "", .preset = "1",
+     .help = "Readings averaged into one sample."},
+    {0},
+};
+
+const struct spectrometer_driver *const spectrometer_drivers[] = {&ocean_driver, NULL};

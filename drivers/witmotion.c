@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/witmotion.h"
+
+#include <arpa/inet.h>
+#include <errno.h>
+#include <modbus.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "drivers/deadline.h"
+#include "drivers/udev.h"
+
+enum {
+    EXCEPTION = 0x80,
+    RESPONSE_MS = 500,
+    BYTE_MS = 50, // between bytes of one reply
+    SERIAL_WORDS = 6,
+    MOST_FAILURES = 5,
+};
+
+static const double standard_gravity = 9.80665; // m/s2
+static const double gravity = 9.81, gravity_slack = 0.3;
+static const double agreement_deg = 2;
+
+static const struct witmotion_map maps[] = {
+    {"wt901c485", 3, 0x34, 12, 0x34, 16.0 / 32768, 0x3d, 1, 180.0 / 32768, 0x2e, 0x7f},
+    {"hwt9073", 3, 0x34, 15, 0x34, 16.0 / 32768, 0x3d, 2, 0.001, 0x2e, 0x7f},
+};
+
+const struct device_id witmotion_ids[] = {
+    {DEVICE_SERIAL, 0x1a86, 0x7523, "CH340 serial adapter (USB-RS485)"},
+    {DEVICE_SERIAL, 0x0403, 0x6001, "FT232R serial adapter (USB-RS485)"},
+    {DEVICE_SERIAL, 0x10c4, 0xea60, "CP210x serial adapter"},
+    {0},
+};
+
+struct accelerometer {
+    struct accelerometer_options options;
+    const struct witmotion_map *map;
+    modbus_t *modbus;
+    bool connected;
+    int version;
+    char serial[2 * SERIAL_WORDS + 1];
+    int failures; // reads without a sample, one after the other
+};
+
+const struct witmotion_map *witmotion_map(int model)
+{
+    return &maps[model];
+}
+
+double witmotion_angle(const struct witmotion_map *map, const uint16_t *registers, int which)
+{
+    const uint16_t *r = registers + (map->angle - map->first) + which * map->words;
+    int32_t steps = map->words == 1 ? (int16_t)r[0] : (int32_t)(r[0] | (uint32_t)r[1] << 16);
+    return steps * map->deg_per_step;
+}
+
+static double wrap(double deg)
+{
+    return deg - 360 * rint(deg / 360);
+}
+
+void witmotion_decode(const struct witmotion_map *map, const uint16_t *registers,
+                      double offset_deg, struct tilt_sample *out)
+{
+    const uint16_t *r = registers + (map->accel - map->first);
+    const double step = map->g_per_step * standard_gravity;
+    out->gravity = (struct vec3){(int16_t)r[0] * step, (int16_t)r[1] * step, (int16_t)r[2] * step};
+    out->tilt_deg = wrap(tilt_of_gravity(out->gravity) + offset_deg);
+    out->angle_deg = wrap(witmotion_angle(map, registers, 0) + offset_deg);
+    out->plausible = fabs(vec3_length(out->gravity) - gravity) <= gravity_slack &&
+                     fabs(wrap(out->tilt_deg - out->angle_deg)) <= agreement_deg;
+}
+
+static bool fail_modbus(const struct accelerometer *a, struct error *err)
+{
+    int code = errno;
+    switch (code) {
+    case ETIMEDOUT:
+        return fail(err, ERROR_RETRY, "%s: no answer from unit %d", a->options.port,
+                    a->options.unit);
+    case EMBBADCRC:
+    case EMBBADDATA:
+    case EMBMDATA:
+    case EMBBADEXC:
+    case EMBBADSLAVE:
+        return fail(err, ERROR_RETRY, "%s: %s", a->options.port, modbus_strerror(code));
+    }
+    return fail(err, ERROR_GONE, "%s: the inclinometer is gone: %s", a->options.port,
+                modbus_strerror(code));
+}
+
+static bool check_reply(const struct accelerometer *a, const uint8_t *reply, int count, int words,
+                        struct error *err)
+{
+    const char *port = a->options.port;
+    if (count < 3)
+        return fail(err, ERROR_RETRY, "%s: reply of %d bytes", port, count);
+    if (reply[0] != a->options.unit)
+        return fail(err, ERROR_RETRY, "%s: unit %d answered for unit %d", port, reply[0],
+                    a->options.unit);
+    if (reply[1] == (a->map->function | EXCEPTION))
+        return fail(err, ERROR_RETRY, "%s: %s", port,
+                    modbus_strerror(MODBUS_ENOBASE + reply[2]));
+    if (reply[1] != a->map->function || reply[2] != 2 * words || count < 3 + 2 * words)
+        return fail(err, ERROR_RETRY, "%s: function %d with %d bytes instead of %d with %d", port,
+                    reply[1], reply[2], a->map->function, 2 * words);
+    return true;
+}
+
+static bool set_timeouts(struct accelerometer *a, int64_t deadline_ns, struct error *err)
+{
+    int response = deadline_ms(deadline_ns, RESPONSE_MS);
+    int byte = response < BYTE_MS ? response : BYTE_MS;
+    if (response <= 0)
+        return fail(err, ERROR_RETRY, "%s: no time left", a->options.port);
+    modbus_set_response_timeout(a->modbus, 0, (uint32_t)response * 1000);
+    modbus_set_byte_timeout(a->modbus, 0, (uint32_t)byte * 1000);
+    return true;
+}
+
+// By raw frames, since libmodbus over TCP takes an answer of any unit.
+static bool read_registers(struct accelerometer *a, int first, int words, uint16_t *out,
+                           int64_t deadline_ns, struct error *err)
+{
+    uint8_t reply[MODBUS_MAX_ADU_LENGTH];
+    const uint8_t request[] = {(uint8_t)a->options.unit, (uint8_t)a->map->function,
+                               first >> 8 & 255,         first & 255,
+                               0,                        (uint8_t)words};
+    if (!set_timeouts(a, deadline_ns, err))
+        return false;
+    modbus_flush(a->modbus);
+    if (modbus_send_raw_request(a->modbus, request, sizeof request) < 0)
+        return fail_modbus(a, err);
+    int count = modbus_receive_confirmation(a->modbus, reply);
+    if (count < 0)
+        return fail_modbus(a, err);
+    int header = modbus_get_header_length(a->modbus);
+    const uint8_t *body = reply + header - 1;
+    if (!check_reply(a, body, count - header + 1, words, err))
+        return false;
+    for (int i = 0; i < words; i++)
+        out[i] = (uint16_t)(body[3 + 2 * i] << 8 | body[4 + 2 * i]);
+    return true;
+}
+
+// "192.168.0.7:502" or "localhost:502": names are not looked up, since that
+// cannot be bounded in time.
+static bool is_tcp(const char *port)
+{
+    return *port != '/' && strchr(port, ':');
+}
+
+static modbus_t *new_tcp(const char *port, struct error *err)
+{
+    char host[128];
+    const char *colon = strrchr(port, ':');
+    struct in_addr address;
+    snprintf(host, sizeof host, "%.*s", (int)(colon - port), port);
+    if (!strcmp(host, "localhost"))
+        strcpy(host, "127.0.0.1");
+    int number = atoi(colon + 1);
+    if (inet_pton(AF_INET, host, &address) == 1 && number > 0 && number < 65536)
+        return modbus_new_tcp(host, number);
+    fail(err, ERROR_CONFIG, "port: \"%s\" is neither a serial line nor a numeric ADDRESS:PORT", port);
+    return NULL;
+}
+
+static bool fail_connect(const char *port, struct error *err)
+{
+    if (errno == EACCES || errno == EPERM)
+        return fail(err, ERROR_SYSTEM,
+                    "%s: no permission; install the udev rules " UDEV_RULES_FILE
+                    " (boothcal list --udev) or join the group of the device",
+                    port);
+    return fail(err, ERROR_GONE, "%s: %s", port, modbus_strerror(errno));
+}
+
+static bool connect_bus(struct accelerometer *a, int64_t deadline_ns, struct error *err)
+{
+    const struct accelerometer_options *o = &a->options;
+    bool tcp = is_tcp(o->port);
+    a->modbus = tcp ? new_tcp(o->port, err) : modbus_new_rtu(o->port, o->baud, 'N', 8, 1);
+    if (!a->modbus)
+        return tcp || fail(err, ERROR_CONFIG, "port: \"%s\" is not a serial line", o->port);
+    modbus_set_slave(a->modbus, o->unit);
+    modbus_set_error_recovery(a->modbus, MODBUS_ERROR_RECOVERY_NONE);
+    if (!set_timeouts(a, deadline_ns, err))
+        return false;
+    a->connected = modbus_connect(a->modbus) == 0;
+    return a->connected || fail_connect(o->port, err);
+}
+
+// Printable characters of either byte order; units differ.
+static void serial_text(const uint16_t words[SERIAL_WORDS], bool low_first,
+                        char out[2 * SERIAL_WORDS + 1])
+{
+    int n = 0;
+    for (int i = 0; i < 2 * SERIAL_WORDS; i++) {
+        char c = (char)(words[i / 2] >> ((i & 1) == low_first ? 8 : 0) & 255);
+        if (c <= ' ' || c > '~')
+            break;
+        out[n++] = c;
+    }
+    out[n] = 0;
+}
+
+static bool known_prefix(const char *serial)
+{
+    return !strncmp(serial, "EMU", 3) || !strncmp(serial, "WT", 2);
+}
+
+static bool greet(struct accelerometer *a, int64_t deadline_ns, struct error *err)
+{
+    uint16_t words[SERIAL_WORDS];
+    if (!read_registers(a, a->map->version, 1, words, deadline_ns, err))
+        return while_doing(err, "asking for the firmware version");
+    a->version = words[0];
+    if (!read_registers(a, a->map->serial, SERIAL_WORDS, words, deadline_ns, NULL))
+        return true;
+    serial_text(words, true, a->serial);
+    if (!known_prefix(a->serial)) {
+        char other[sizeof a->serial];
+        serial_text(words, false, other);
+        if (known_prefix(other))
+            strcpy(a->serial, other);
+    }
+    return true;
+}
+
+static void witmotion_close(struct accelerometer *a)
+{
+    if (!a)
+        return;
+    if (a->connected)
+        modbus_close(a->modbus);
+    modbus_free(a->modbus);
+    free(a);
+}
+
+static struct accelerometer *witmotion_open(const struct accelerometer_options *options,
+                                            int64_t deadline_ns, struct error *err)
+{
+    struct accelerometer *a = calloc(1, sizeof *a);
+    if (!a) {
+        fail_errno(err, "opening the inclinometer");
+        return NULL;
+    }
+    a->options = *options;
+    a->map = witmotion_map(options->model);
+    if (connect_bus(a, deadline_ns, err)) {
+        if (greet(a, deadline_ns, err))
+            return a;
+        if (err && err->code == ERROR_RETRY)
+            err->code = ERROR_GONE;
+    }
+    witmotion_close(a);
+    return NULL;
+}
+
+static bool witmotion_read(struct accelerometer *a, int64_t deadline_ns, struct tilt_sample *out,
+                           struct error *err)
+{
+    uint16_t registers[WITMOTION_MOST];
+    int64_t asked = clock_now_ns();
+    if (!read_registers(a, a->map->first, a->map->count, registers, deadline_ns, err)) {
+        if (++a->failures >= MOST_FAILURES && err)
+            err->code = ERROR_GONE;
+        return false;
+    }
+    a->failures = 0;
+    out->taken = (struct interval){asked, clock_now_ns()};
+    witmotion_decode(a->map, registers, a->options.offset_deg, out);
+    return true;
+}
+
+static void witmotion_identify(const struct accelerometer *a, struct instrument_identity *out)
+{
+    memset(out, 0, sizeof *out);
+    snprintf(out->model, sizeof out->model, "%s", a->map->model);
+    snprintf(out->serial, sizeof out->serial, "%s", a->serial);
+    snprintf(out->firmware, sizeof out->firmware, "%d", a->version);
+    out->emulated = !strncmp(a->serial, "EMU", 3);
+}
+
+const struct accelerometer_driver witmotion_driver = {"witmotion", witmotion_open, witmotion_read,
+                                                      witmotion_identify, witmotion_close};
