@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the emulated booth is made of, as a person writes it down: an INI file
+// of facts, one struct a section. Places are in the booth frame: metres, x
+// right and y up as the observer sees them, z towards the observer.
+#ifndef SIMULATOR_SCENARIO_H
+#define SIMULATOR_SCENARIO_H
+
+#include <stdbool.h>
+#include <stdio.h>
+
+#include "base/error.h"
+
+enum { SCENARIO_LAMPS_MOST = 6, SCENARIO_NAME_SIZE = 32, SCENARIO_PATH_SIZE = 512 };
+
+struct scenario_world {
+    int seed;
+    double speed; // world seconds per second
+    bool cold;    // lamps are cold each time they are switched on
+    char script[SCENARIO_PATH_SIZE];
+    char lamp[SCENARIO_NAME_SIZE]; // at the start; "" = the first, "none" = dark
+    double level;
+};
+
+struct scenario_screen {
+    double width_m, height_m;
+    int width_px, height_px;
+};
+
+struct scenario_stand {
+    double hinge_m[3];
+    double centre_from_hinge_m[3]; // in screen axes
+    double tilt_deg;               // 0 lies flat face up, 90 stands upright
+};
+
+struct scenario_ceiling {
+    double centre_m[3], width_m, depth_m;
+    int true_px[2]; // of the true luminance image
+    int map_px[2];  // of the camera's luminance map
+    double map_noise;
+    double map_read_noise_cdm2;
+    double map_scale_error; // greatest; each lamp has its own
+};
+
+struct scenario_head {
+    double eye_m[3];
+    double clip_from_eye_m[3]; // when the head faces straight at the booth
+    double turn_most_deg;
+};
+
+struct scenario_camera {
+    double place_m[3], pitch_deg, yaw_deg;
+};
+
+struct scenario_panel {
+    double white_cdm2, black_cdm2, reflectance;
+    int bits;
+    double interaction, dispersion, ripple, uniformity; // 1 = as designed, 0 = none
+    double on_s, warmup_drop, warmup_s;
+};
+
+struct scenario_spectrometer {
+    double place_m[3]; // of the cosine corrector, which looks straight up
+    double collector_mm2;
+    double calibration_error;
+    char serial[SCENARIO_NAME_SIZE];
+};
+
+struct scenario_radiometer {
+    double screen_spot_m, ceiling_spot_m; // diameters
+    double hurry;
+    char serial[SCENARIO_NAME_SIZE];
+};
+
+struct scenario_serial {
+    char serial[SCENARIO_NAME_SIZE];
+};
+
+enum lamp_form { LAMP_TUBES, LAMP_SPOTS };
+
+// A lamp that lights the ceiling. A name of "" means that there is none.
+struct scenario_lamp {
+    char name[SCENARIO_NAME_SIZE]; // letters, digits, '.', '_', '-'
+    char spectrum[SCENARIO_PATH_SIZE];
+    int form;           // enum lamp_form
+    int count;          // tubes or spots
+    double row_m[2];    // first and last: tubes along z, spots along x, from the ceiling's centre
+    double offset_m;    // of the row on the other axis
+    double diameter_m;  // of a tube or a spot
+    double length_m;    // of a tube
+    double haze;        // luminance of the ceiling between, over the lamp's greatest
+    double lux;         // at the screen's centre at the starting tilt, level 1, warm
+    double warmup_drop; // relative loss of light just after a cold start
+    double warmup_s;    // time constant of the way up
+};
+
+struct scenario {
+    struct scenario_world world;
+    struct scenario_screen screen;
+    struct scenario_stand stand;
+    struct scenario_ceiling ceiling;
+    struct scenario_head head;
+    struct scenario_camera camera;
+    struct scenario_panel panel;
+    struct scenario_spectrometer spectrometer;
+    struct scenario_radiometer radiometer;
+    struct scenario_serial inclinometer, tracker;
+    struct scenario_lamp lamps[SCENARIO_LAMPS_MOST];
+    char path[SCENARIO_PATH_SIZE]; // of the file; "" = made by hand
+};
+
+// Everything at its preset, without any lamp.
+void scenario_preset(struct scenario *scenario);
+
+// Reads a file. Paths in it are relative to its folder. Errors (CONFIG) name
+// file, line, key, value and what is allowed. *scenario is undefined on failure.
+bool scenario_load(const char *path, struct scenario *scenario, struct error *err);
+
+// "NAME=SPECTRUM": gives the lamp of that name another spectrum, or adds a
+// lamp of two tubes with it. SPECTRUM is a CIE name or a path relative to the
+// current folder.
+bool scenario_set_lamp(struct scenario *scenario, const char *text, struct error *err);
+
+// What no single row can check: names, at least one lamp, the starting lamp,
+// serials. scenario_load has done it already.
+bool scenario_check(const struct scenario *scenario, struct error *err);
+
+// Index of a lamp by name, or -1.
+int scenario_lamp_index(const struct scenario *scenario, const char *name);
+
+// A path that the scenario file gave, as seen from the current folder.
+void scenario_beside(const struct scenario *scenario, const char *path,
+                     char out[SCENARIO_PATH_SIZE * 2]);
+
+// Prints every section with its settings.
+void scenario_describe(FILE *out);
+
+#endif
