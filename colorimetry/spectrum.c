@@ -112,49 +112,84 @@ static double lagrange(const struct samples *s, long i, double t)
     return sum;
 }
 
-// Cuts the undershoots between two samples and takes what that adds from the
-// rest of the interval, else (debt) from the next ones, so that a spiky lamp
-// keeps its energy.
-static double keep_positive(double *v, size_t count, double debt)
+// Grid points between two samples.
+struct run {
+    size_t first, count;
+    double kept, wanted; // sums: of the positive values, and what it should be
+};
+
+static void cut_undershoots(struct spectrum *s, struct run *runs, size_t count)
 {
-    double sum = -debt, kept = 0;
-    for (size_t k = 0; k < count; k++) {
-        sum += v[k];
-        kept += fmax(v[k], 0);
+    for (struct run *r = runs; r < runs + count; r++) {
+        for (size_t g = r->first; g < r->first + r->count; g++) {
+            r->wanted += s->v[g];
+            s->v[g] = fmax(s->v[g], 0);
+            r->kept += s->v[g];
+        }
     }
-    if (sum == kept)
-        return 0;
-    for (size_t k = 0; k < count; k++)
-        v[k] = fmax(v[k], 0) * (sum > 0 ? sum / kept : 0);
-    return fmax(-sum, 0);
+}
+
+// A run below zero as a whole is paid for by the brighter of its neighbours:
+// the peak beside which it undershoots.
+static void pay_for_undershoots(struct run *runs, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        if (runs[i].wanted >= 0)
+            continue;
+        double before = i > 0 ? runs[i - 1].wanted : 0;
+        double after = i + 1 < count ? runs[i + 1].wanted : 0;
+        if (before > 0 && before >= after)
+            runs[i - 1].wanted += runs[i].wanted;
+        else if (after > 0)
+            runs[i + 1].wanted += runs[i].wanted;
+        runs[i].wanted = 0;
+    }
+}
+
+// No power below zero, and the energy of the lamp as it was.
+static void keep_positive(struct spectrum *s, struct run *runs, size_t count)
+{
+    cut_undershoots(s, runs, count);
+    pay_for_undershoots(runs, count);
+    for (struct run *r = runs; r < runs + count; r++) {
+        double scale = r->kept > 0 ? fmax(r->wanted, 0) / r->kept : 0;
+        for (size_t g = r->first; g < r->first + r->count && r->wanted != r->kept; g++)
+            s->v[g] *= scale;
+    }
+}
+
+static bool nowhere_negative(const struct samples *s)
+{
+    for (size_t i = 0; i < s->count; i++)
+        if (s->values[i] < 0)
+            return false;
+    return true;
 }
 
 static void interpolate_smooth(const struct samples *s, bool held, struct spectrum *out)
 {
-    long last = (long)s->count - 1;
+    struct run runs[SPECTRUM_COUNT] = {{0}};
+    long last = (long)s->count - 1, interval = -1;
+    size_t count = 0;
     double step = (s->nm[last] - s->nm[0]) / (double)last;
-    bool positive = true;
-    for (size_t i = 0; i < s->count; i++)
-        positive = positive && s->values[i] >= 0;
-    size_t run = 0; // first grid point of the interval at hand
-    long interval = -1;
-    double debt = 0;
     for (size_t g = 0; g < SPECTRUM_COUNT; g++) {
         double nm = SPECTRUM_FIRST_NM + (double)g, at = (nm - s->nm[0]) / step;
         long i = (long)floor(at + STEP_SLACK_NM);
-        double t = fmax(at - (double)i, 0);
-        if (positive && (i != interval || t < STEP_SLACK_NM)) {
-            debt = keep_positive(out->v + run, g - run, debt);
-            run = t < STEP_SLACK_NM ? g + 1 : g;
+        double t = at - (double)i;
+        if (i < 0 || i > last || (i == last && t > STEP_SLACK_NM)) {
+            out->v[g] = end_value(s, nm, held);
+        } else if (t < STEP_SLACK_NM) {
+            out->v[g] = s->values[i];
+        } else {
+            out->v[g] = s->count < SPRAGUE_POINTS ? lagrange(s, i, t) : sprague(s, i, t);
+            if (i != interval)
+                runs[count++].first = g;
+            runs[count - 1].count++;
             interval = i;
         }
-        if (at < -STEP_SLACK_NM || at > (double)last + STEP_SLACK_NM)
-            out->v[g] = end_value(s, nm, held);
-        else if (t < STEP_SLACK_NM || i >= last)
-            out->v[g] = s->values[i > last ? last : i];
-        else
-            out->v[g] = s->count < SPRAGUE_POINTS ? lagrange(s, i, t) : sprague(s, i, t);
     }
+    if (nowhere_negative(s))
+        keep_positive(out, runs, count);
 }
 
 static void interpolate_linear(const struct samples *s, bool held, struct spectrum *out)

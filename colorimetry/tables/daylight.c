@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Components S0, S1, S2 of daylight, 360 to 830 nm every 5 nm. Source: CIE
-// 015:2018 table 8 (Judd, MacAdam, Wyszecki 1964).
+// 015:2018 (Judd, MacAdam, Wyszecki 1964).
 #include "colorimetry/tables/tables.h"
 
 const double DAYLIGHT_BASIS[3][DAYLIGHT_BASIS_COUNT] = {

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// CIE illuminants as published, every 5 nm. D50, D55, D65 and D75 from 360 to
-// 830 nm (CIE 015:2018 tables 5 and 6; 785 to 830 nm from S0, S1, S2), FL1..12
-// and FL3.15 (CIE 015:2018 table 10) and the LED illuminants (table 12) from 380
-// to 780 nm.
+// CIE illuminants as published, every 5 nm: D50, D55, D65 and D75 from 360 to
+// 830 nm (785 to 830 nm from S0, S1, S2), FL1 to FL12,
+// FL3.15 and the LED illuminants from 380 to 780 nm. Source: CIE 015:2018.
 #include "colorimetry/tables/tables.h"
 
 static const double D50[] = {

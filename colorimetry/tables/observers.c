@@ -4,7 +4,7 @@
 #include "colorimetry/tables/tables.h"
 
 const struct spectrum OBSERVER_CMF[OBSERVER_COUNT][3] = {
-    // CIE 1931, 2 degrees: CIE 015:2018 table 1 at 1 nm (ISO/CIE 11664-1)
+    // CIE 1931, 2 degrees: CIE 015:2018, ISO/CIE 11664-1
     [OBSERVER_1931_2] = {
         {{
             0.0001299, 0.000145847, 0.0001638021, 0.0001840037, 0.0002066902, 0.0002321,
@@ -209,7 +209,7 @@ const struct spectrum OBSERVER_CMF[OBSERVER_COUNT][3] = {
             0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         }},
     },
-    // CIE 1964, 10 degrees: CIE 015:2018 at 1 nm (ISO/CIE 11664-1)
+    // CIE 1964, 10 degrees: CIE 015:2018, ISO/CIE 11664-1
     [OBSERVER_1964_10] = {
         {{
             1.222e-7, 1.85138e-7, 2.7883e-7, 4.1747e-7, 6.2133e-7, 9.1927e-7, 1.35198e-6,
@@ -381,7 +381,7 @@ const struct spectrum OBSERVER_CMF[OBSERVER_COUNT][3] = {
             0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
         }},
     },
-    // CIE 2015, 2 degrees, from cone fundamentals: CIE 170-2:2015, table 10.14
+    // CIE 2015, 2 degrees, from cone fundamentals: CIE 170-2:2015
     [OBSERVER_2015_2] = {
         {{
             0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
@@ -578,7 +578,7 @@ const struct spectrum OBSERVER_CMF[OBSERVER_COUNT][3] = {
             0, 0, 0, 0, 0, 0,
         }},
     },
-    // CIE 2015, 10 degrees, from cone fundamentals: CIE 170-2:2015, table 10.15
+    // CIE 2015, 10 degrees, from cone fundamentals: CIE 170-2:2015
     [OBSERVER_2015_10] = {
         {{
             0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
