@@ -13,7 +13,9 @@ enum { RAMP_MOST = 4096 };
 struct window {
     struct context face;
     GLFWwindow *window;
-    bool started;
+    GLFWmonitor *monitor; // whose gamma ramp was changed, or NULL
+    unsigned ramp_size;
+    unsigned short old_ramp[3][RAMP_MOST];
 };
 
 static bool fail_glfw(struct error *err, const char *what)
@@ -52,13 +54,27 @@ static bool window_events(struct context *context, double timeout_s)
     return !glfwWindowShouldClose(w->window);
 }
 
+static bool still_connected(const GLFWmonitor *monitor)
+{
+    int count = 0;
+    GLFWmonitor **monitors = glfwGetMonitors(&count);
+    for (int i = 0; i < count; i++)
+        if (monitors[i] == monitor)
+            return true;
+    return false;
+}
+
+// GLFW itself stays for the life of the process, as EGL's display does: what
+// the X driver never frees would otherwise lose its owner.
 static void window_close(struct context *context)
 {
     struct window *w = (struct window *)context;
+    if (w->monitor && still_connected(w->monitor)) {
+        GLFWgammaramp old = {w->old_ramp[0], w->old_ramp[1], w->old_ramp[2], w->ramp_size};
+        glfwSetGammaRamp(w->monitor, &old);
+    }
     if (w->window)
         glfwDestroyWindow(w->window);
-    if (w->started)
-        glfwTerminate();
     free(w);
 }
 
@@ -97,24 +113,30 @@ static bool is_neutral(const GLFWgammaramp *ramp)
     return true;
 }
 
-// Sets a straight ramp and reads back what the driver made of it. GLFW puts
-// the old one back when it terminates.
-static const char *straighten_ramp(GLFWmonitor *monitor)
+static void keep_ramp(struct window *w, GLFWmonitor *monitor, const GLFWgammaramp *ramp)
+{
+    w->monitor = monitor;
+    w->ramp_size = ramp->size;
+    memcpy(w->old_ramp[0], ramp->red, ramp->size * sizeof *ramp->red);
+    memcpy(w->old_ramp[1], ramp->green, ramp->size * sizeof *ramp->green);
+    memcpy(w->old_ramp[2], ramp->blue, ramp->size * sizeof *ramp->blue);
+}
+
+// Sets a straight ramp and reads back what the driver made of it.
+static const char *straighten_ramp(struct window *w, GLFWmonitor *monitor)
 {
     unsigned short straight[RAMP_MOST];
     const GLFWgammaramp *old = glfwGetGammaRamp(monitor);
-    glfwGetError(NULL);
     if (!old || old->size < 2 || old->size > RAMP_MOST)
         return "gamma ramp unknown";
+    keep_ramp(w, monitor, old);
     GLFWgammaramp ramp = {straight, straight, straight, old->size};
     for (unsigned i = 0; i < ramp.size; i++)
         straight[i] = (unsigned short)(65535.0 * i / (ramp.size - 1) + 0.5);
     glfwSetGammaRamp(monitor, &ramp);
-    glfwGetError(NULL);
     const GLFWgammaramp *now = glfwGetGammaRamp(monitor);
-    glfwGetError(NULL);
-    return now && now->size == ramp.size && is_neutral(now) ? "gamma ramp neutral"
-                                                            : "gamma ramp NOT neutral";
+    bool neutral = now && now->size == ramp.size && is_neutral(now);
+    return neutral ? "gamma ramp neutral" : "gamma ramp NOT neutral";
 }
 
 static void hint(int bits)
@@ -149,7 +171,6 @@ static bool start(struct window *w, const struct renderer_options *options, stru
     int width = 0, height = 0;
     if (!glfwInit())
         return fail_glfw(err, "GLFW");
-    w->started = true;
     if (options->fullscreen && !(monitor = find_monitor(options->monitor, err)))
         return false;
     hint(options->bits == 10 ? 10 : 8);
@@ -160,7 +181,7 @@ static bool start(struct window *w, const struct renderer_options *options, stru
     glfwSetWindowRefreshCallback(w->window, on_damage);
     glfwSetInputMode(w->window, GLFW_CURSOR, GLFW_CURSOR_HIDDEN);
     if (monitor)
-        snprintf(w->face.note, sizeof w->face.note, "%s", straighten_ramp(monitor));
+        snprintf(w->face.note, sizeof w->face.note, "%s", straighten_ramp(w, monitor));
     else
         glfwSetWindowPos(w->window, 0, 0);
     glfwGetFramebufferSize(w->window, &width, &height);
@@ -171,7 +192,9 @@ static bool start(struct window *w, const struct renderer_options *options, stru
         return false;
     glfwSwapInterval(1);
     w->face.window_bits = bits_granted();
-    return true;
+    return w->face.window_bits >= 8 ||
+           fail(err, ERROR_SYSTEM, "window: %d bits a channel; at least 8 are needed",
+                w->face.window_bits);
 }
 
 struct context *window_open(const struct renderer_options *options, struct error *err)

@@ -190,6 +190,34 @@ static void a_monitor_that_is_not_there_is_named_in_the_refusal(void **state)
     assert_non_null(strstr(err.text, "PROOF-1"));
 }
 
+static void full_screen_on_the_first_monitor_shows_the_same(void **state)
+{
+    (void)state;
+    struct error err = {0};
+    struct renderer_options options = {.window = true, .fullscreen = true, .width = SCREEN_WIDTH,
+                                       .height = SCREEN_HEIGHT};
+    struct renderer *renderer = renderer_create(&options, &err);
+    assert_good(renderer, err);
+    print_message("%s\n", renderer_name(renderer));
+    assert_non_null(strstr(renderer_name(renderer), "gamma ramp"));
+    struct scene patch = {.kind = SCENE_PATCH, .patch = {0.25, 0.5, 0.75}, .bits = 8};
+    assert_good(renderer_show(renderer, &patch, false, NULL, &err), err);
+    assert_screen_is(renderer);
+    renderer_destroy(renderer);
+}
+
+static void a_window_of_another_size_than_the_monitor_is_refused(void **state)
+{
+    (void)state;
+    struct error err = {0};
+    struct renderer_options options = {.window = true, .fullscreen = true, .width = 1280,
+                                       .height = 800};
+    assert_null(renderer_create(&options, &err));
+    print_message("%s\n", err.text);
+    assert_int_equal(err.code, ERROR_CONFIG);
+}
+
+// The first test: once GLFW has a display it keeps it.
 static void without_a_display_the_window_is_refused_in_one_line(void **state)
 {
     (void)state;
@@ -206,11 +234,13 @@ static void without_a_display_the_window_is_refused_in_one_line(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(without_a_display_the_window_is_refused_in_one_line),
         cmocka_unit_test(the_screen_shows_exactly_the_counts_when_show_returns),
         cmocka_unit_test(the_picture_is_not_upside_down),
         cmocka_unit_test(ten_bits_on_an_eight_bit_window_become_eight),
+        cmocka_unit_test(full_screen_on_the_first_monitor_shows_the_same),
+        cmocka_unit_test(a_window_of_another_size_than_the_monitor_is_refused),
         cmocka_unit_test(a_monitor_that_is_not_there_is_named_in_the_refusal),
-        cmocka_unit_test(without_a_display_the_window_is_refused_in_one_line),
     };
     return cmocka_run_group_tests(tests, open_server, close_server);
 }
