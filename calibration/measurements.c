@@ -148,7 +148,7 @@ static bool rescale(struct measurements *m, double scale, struct error *err)
 static bool take(const struct cgats *file, struct measurements *m, struct error *err)
 {
     int column[6];
-    double scale;
+    double scale = 1;
     if (!find_fields(&file->table, column, err))
         return false;
     m->patches = calloc(file->table.rows, sizeof *m->patches);

@@ -1,17 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "calibration/measurements.h"
+#include "calibration/patches.h"
+
+// cmocka defines a macro named fail: it comes last.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
 
 #include <cmocka.h>
-#include <math.h>
-#include <stdio.h>
-#include <string.h>
-#include <unistd.h>
-
-#include "calibration/measurements.h"
-#include "calibration/patches.h"
 
 static const double CODE = 1e-9;     // counts are exact 8-bit fractions
 static const double WRITTEN = 1e-4;  // relative: digits of a .ti3

@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "calibration/proof.h"
+
+// cmocka defines a macro named fail: it comes last.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
 
 #include <cmocka.h>
-#include <math.h>
-#include <stdio.h>
-#include <string.h>
-
-#include "calibration/proof.h"
 
 static const double EXACT = 1e-9; // sums of a few doubles
 
