@@ -358,7 +358,7 @@ void control_unlisten(struct control_server *server)
 
 static json_t *refusal(const struct error *err)
 {
-    bool filled = err->code != ERROR_NONE;
+    bool filled = err && err->code != ERROR_NONE;
     return json_pack("{s:b, s:s, s:o}", "ok", 0, "code",
                      error_code_name(filled ? err->code : ERROR_SYSTEM), "error",
                      json_text(filled ? err->text : "no answer"));
@@ -447,10 +447,11 @@ static bool answer_lines(struct control_server *server, struct caller *caller,
         json_t *reply = answer(line, size, handle, context);
         server->asking = NULL;
         done += size + 1;
-        if (caller->awaited)
+        if (caller->awaited || caller->answered)
             json_decref(reply);
         else
             ok = queue_reply(caller, reply) && flush(caller);
+        caller->answered = false;
     }
     if (done)
         bytes_drop(&caller->in, done);
@@ -481,8 +482,9 @@ void control_answer(struct control_server *server, uint64_t ticket, json_t *repl
         json_decref(reply);
         reply = NULL;
     }
+    // Nobody is hung up here: this may run inside that client's own handler.
     if (!queue_reply(caller, reply ? reply : refusal(err)) || !flush(caller))
-        hang_up(caller);
+        caller->ended = true;
 }
 
 static void turn_away(int fd)
