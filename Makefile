@@ -36,6 +36,7 @@ files_libs       := -linih -lOpenEXRCore-3_1 -lpng $(base_libs)
 colorimetry_libs := -lm
 drivers_libs     := -lusb-1.0 -lmodbus -lhidapi-hidraw -ludev -lopencv_calib3d -lopencv_core -lstdc++ -lm
 simulator_libs   := $(shell pkg-config --libs umockdev-1.0 2>/dev/null) -lmodbus -lutil -lm -lpthread
+simulator_test_libs := -lusb-1.0 -lhidapi-hidraw
 render_libs      := -lglfw -lepoxy -lEGL -lm
 config_libs      := -lm
 calibration_libs := -lceres -lglog -lmatio -lstdc++ -lm
@@ -52,7 +53,7 @@ FAKES    := $(wildcard tests/fakes/*.c)
 SHADERS  := $(wildcard render/shaders/*.glsl colorimetry/*.glsl)
 object    = $(patsubst %,$(BUILD)/%.o,$(basename $(1)))
 
-.PHONY: all deps demo check check-here bench format layers links install uninstall clean
+.PHONY: FORCE all deps demo check check-here bench format layers links install uninstall clean
 .SECONDARY:
 
 all: $(PROGRAMS:%=$(BUILD)/%)
@@ -79,12 +80,19 @@ $(BUILD)/render/shaders_embedded.inc: $(SHADERS)
 	@mkdir -p $(@D)
 	for f in $^; do printf '{"%s",\n' $$(basename $$f); sed -e 's/\\/\\\\/g; s/"/\\"/g; s/^/"/; s/$$/\\n"/' $$f; echo '},'; done > $@
 
+# What names the version is made again when the version changes.
+$(call object,$(shell grep -l -r --include='*.c' BOOTHD_VERSION $(FOLDERS))): $(BUILD)/version
+$(BUILD)/version: FORCE
+	@mkdir -p $(@D)
+	@echo '$(VERSION)' | cmp -s - $@ || echo '$(VERSION)' > $@
+FORCE:
+
 define folder_rule
 $(BUILD)/$(1).a: $(call object,$(filter $(1)/%,$(SOURCES)))
 	@rm -f $$@
 	$(AR) rcs $$@ $$^
 $(BUILD)/tests/$(1)/%: $(BUILD)/tests/$(1)/%.o $(call object,$(FAKES)) $(call archives,$(1) $(call below,$(1)))
-	$(CC) -o $$@ $$< $(call object,$(FAKES)) $(call libs,$(1) $(call below,$(1))) -lcmocka
+	$(CC) -o $$@ $$< $(call object,$(FAKES)) $(call libs,$(1) $(call below,$(1))) $($(1)_test_libs) -lcmocka
 $(BUILD)/links/$(1): $(BUILD)/$(1).a $(call archives,$(call below,$(1)))
 	@mkdir -p $$(@D)
 	$(CC) -shared -Wl,--no-undefined -o $$@ -Wl,--whole-archive $$< -Wl,--no-whole-archive $(call libs,$(1) $(call below,$(1)))
@@ -119,6 +127,9 @@ demo:
 	@$(MAKE) -s deps
 	$(MAKE) all
 	BUILD=$(BUILD) calibration/demo.sh $(BUILD)/demo
+
+format:
+	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')
 
 clean:
 	rm -rf build

@@ -146,6 +146,21 @@ static struct detector *make_detector(const struct usb2000plus_options *options)
     return detector_create(&detector);
 }
 
+void usb2000plus_power_on(struct usb2000plus *device, int64_t now_ns)
+{
+    struct usb2000plus *d = device;
+    d->options.powered_ns = now_ns;
+    memset(d->registers, 0, sizeof(d->registers));
+    d->registers[REGISTER_VERSION] = d->options.flame ? 0x3012 : 0x2012;
+    d->registers[REGISTER_PROGRAMMED] = 0x5501;
+    d->registers[REGISTER_SATURATION] = SATURATION;
+    d->integration_us = 100000;
+    d->powered = true;
+    d->strobe = d->halted = d->integrating = d->loaded = false;
+    d->trigger = 0;
+    d->reply_count = d->requests = d->spare = 0;
+}
+
 struct usb2000plus *usb2000plus_create(const struct usb2000plus_options *options)
 {
     struct usb2000plus *d = calloc(1, sizeof(*d));
@@ -156,11 +171,7 @@ struct usb2000plus *usb2000plus_create(const struct usb2000plus_options *options
     noise_init(&d->noise, options->seed, 's');
     set_slots(d);
     set_descriptors(d);
-    d->registers[REGISTER_VERSION] = options->flame ? 0x3012 : 0x2012;
-    d->registers[REGISTER_PROGRAMMED] = 0x5501;
-    d->registers[REGISTER_SATURATION] = SATURATION;
-    d->integration_us = 100000;
-    d->powered = true;
+    usb2000plus_power_on(d, options->powered_ns);
     d->detector = make_detector(options);
     if (d->detector)
         return d;

@@ -15,7 +15,7 @@ struct usb2000plus_options {
     const char *serial;        // slot 0, at most 15 characters
     uint64_t seed;
     double collector_mm2;
-    int64_t powered_ns;        // when power came on
+    int64_t powered_ns;        // when power first came on
     bool full_speed;           // 12 Mbit/s bus
     bool flame;                // firmware 3: register reads echo 0xFE
     bool blank_nonlinearity;   // slots 6..14 never programmed (0xFF)
@@ -26,6 +26,10 @@ struct usb2000plus;
 // NULL when out of memory.
 struct usb2000plus *usb2000plus_create(const struct usb2000plus_options *options);
 void usb2000plus_destroy(struct usb2000plus *device);
+
+// Power comes back: settings and acquisition begin anew, the EEPROM stays.
+// Call while it is unplugged.
+void usb2000plus_power_on(struct usb2000plus *device, int64_t now_ns);
 
 // The device's face to the bus; lives as long as the device.
 struct usb_model usb2000plus_model(struct usb2000plus *device);

@@ -100,9 +100,20 @@ struct wiimote *wiimote_create(const struct wiimote_options *options)
     snprintf(d->serial, sizeof(d->serial), "%s", options->serial);
     noise_init(&d->noise, options->seed, 'w');
     memset(d->memory, 0xFF, sizeof(d->memory));
+    wiimote_connect(d);
+    return d;
+}
+
+void wiimote_connect(struct wiimote *device)
+{
+    struct wiimote *d = device;
     d->mode = IN_BUTTONS;
     d->reporting = true;
-    return d;
+    d->continuous = d->clock = d->logic = false;
+    d->leds = 0;
+    d->queued = 0;
+    d->last.size = 0;
+    memset(d->camera, 0, sizeof(d->camera));
 }
 
 void wiimote_destroy(struct wiimote *device)

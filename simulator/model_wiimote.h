@@ -22,6 +22,9 @@ struct wiimote;
 struct wiimote *wiimote_create(const struct wiimote_options *options);
 void wiimote_destroy(struct wiimote *device);
 
+// The remote connects anew: no report mode set, the camera off.
+void wiimote_connect(struct wiimote *device);
+
 struct hid_model wiimote_model(struct wiimote *device);
 
 // What happens to a real one whose battery slips or whose extension is

@@ -47,6 +47,7 @@ struct wire_options {
     double radiometer_hurry;    // divides the radiometer's exposure times, >= 1
     double collector_mm2;       // of the cosine corrector
     double calibration_error;   // relative slope error of spectrometer.cal over 180 nm, 0 = exact
+    double camera_pitch_deg;    // of the camera's axis above the horizon, for its own accelerometer
 };
 
 struct wire;

@@ -1,0 +1,404 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulator/hid_device.h"
+
+#include <linux/hidraw.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/ioctl.h>
+
+#include "base/clock.h"
+#include "simulator/wire_fault.h"
+#include "simulator/wire_node.h"
+#include "simulator/wire_wait.h"
+
+enum { REPORTS = 64 }; // as the kernel's hidraw keeps for a reader
+
+struct report {
+    uint8_t bytes[HID_REPORT_MOST];
+    size_t size;
+};
+
+struct hid_device_emulated {
+    UMockdevTestbed *testbed;
+    UMockdevIoctlBase *handler;
+    struct hid_model model;
+    struct node node;
+    int number; // of the HID device, 1 at the first plug
+    char devnode[32], hid_path[128], hidraw_path[192];
+
+    struct waiter waiter; // its lock guards everything below and the model
+    pthread_t thread;
+    bool running, stopping, plugged;
+    int clients;
+    struct report queue[REPORTS];
+    int queued;
+    UMockdevIoctlClient *reader; // waits in a blocking read
+    enum wire_fault fault;
+    struct noise noise;
+};
+
+// ---- reports -----------------------------------------------------------------------
+
+static struct report take(struct hid_device_emulated *d)
+{
+    struct report first = d->queue[0];
+    d->queued--;
+    memmove(d->queue, d->queue + 1, (size_t)d->queued * sizeof(d->queue[0]));
+    if (d->queued == 0)
+        node_set_readable(&d->node, false);
+    return first;
+}
+
+static void give(UMockdevIoctlClient *client, const struct report *report)
+{
+    UMockdevIoctlData *arg = umockdev_ioctl_client_get_arg(client);
+    size_t room = (size_t)arg->data_len;
+    size_t size = report->size < room ? report->size : room;
+    umockdev_ioctl_data_update(arg, 0, (guint8 *)report->bytes, (gint)size);
+    umockdev_ioctl_client_complete(client, (glong)size, 0);
+}
+
+static void queue(struct hid_device_emulated *d, struct report report)
+{
+    report.size = fault_on(d->fault, &d->noise, report.bytes, report.size);
+    if (report.size == 0 || d->clients == 0)
+        return;
+    if (d->reader) {
+        give(d->reader, &report);
+        d->reader = NULL;
+        return;
+    }
+    if (d->queued == REPORTS)
+        return;
+    d->queue[d->queued++] = report;
+    if (d->queued == 1)
+        node_set_readable(&d->node, true);
+}
+
+static int64_t pump(struct hid_device_emulated *d)
+{
+    for (;;) {
+        struct report report;
+        int64_t again_ns;
+        int size = d->model.in(d->model.context, clock_now_ns(), report.bytes, &again_ns);
+        if (size < 0)
+            return again_ns;
+        report.size = (size_t)size;
+        queue(d, report);
+    }
+}
+
+static void *run(void *argument)
+{
+    struct hid_device_emulated *d = argument;
+    waiter_lock(&d->waiter);
+    while (!d->stopping) {
+        int64_t again_ns = d->plugged ? pump(d) : INT64_MAX;
+        waiter_wait(&d->waiter, again_ns);
+    }
+    waiter_unlock(&d->waiter);
+    return NULL;
+}
+
+// ---- hidraw --------------------------------------------------------------------------
+
+static gboolean on_read(UMockdevIoctlBase *handler, UMockdevIoctlClient *client, gpointer data)
+{
+    (void)handler;
+    struct hid_device_emulated *d = data;
+    waiter_lock(&d->waiter);
+    if (!d->plugged) {
+        umockdev_ioctl_client_complete(client, -1, EIO);
+    } else if (d->queued > 0) {
+        struct report report = take(d);
+        give(client, &report);
+    } else {
+        d->reader = client;
+    }
+    waiter_unlock(&d->waiter);
+    return TRUE;
+}
+
+static gboolean on_write(UMockdevIoctlBase *handler, UMockdevIoctlClient *client, gpointer data)
+{
+    (void)handler;
+    struct hid_device_emulated *d = data;
+    UMockdevIoctlData *arg = umockdev_ioctl_client_get_arg(client);
+    size_t size = (size_t)arg->data_len;
+    waiter_lock(&d->waiter);
+    int status = -ENODEV;
+    if (d->plugged)
+        status = d->model.out(d->model.context, clock_now_ns(), arg->data, size);
+    waiter_wake(&d->waiter);
+    waiter_unlock(&d->waiter);
+    umockdev_ioctl_client_complete(client, status < 0 ? -1 : (glong)size,
+                                   status < 0 ? -status : 0);
+    return TRUE;
+}
+
+static int put(UMockdevIoctlData *arg, size_t size, const void *bytes, size_t count)
+{
+    UMockdevIoctlData *out = umockdev_ioctl_data_resolve(arg, 0, size, NULL);
+    if (!out)
+        return -EFAULT;
+    memcpy(out->data, bytes, count < size ? count : size);
+    g_object_unref(out);
+    return (int)(count < size ? count : size);
+}
+
+static int put_descriptor(const struct hid_model *m, UMockdevIoctlData *arg)
+{
+    struct hidraw_report_descriptor text = {.size = (uint32_t)m->descriptor_size};
+    memcpy(text.value, m->descriptor, m->descriptor_size);
+    int result = put(arg, sizeof(text), &text, sizeof(text));
+    return result < 0 ? result : 0;
+}
+
+static int answer(struct hid_device_emulated *d, gulong request, UMockdevIoctlData *arg)
+{
+    const struct hid_model *m = &d->model;
+    if (!d->plugged)
+        return -ENODEV;
+    if (request == HIDIOCGRDESCSIZE) {
+        int size = (int)m->descriptor_size;
+        return put(arg, sizeof(size), &size, sizeof(size)) < 0 ? -EFAULT : 0;
+    }
+    if (request == HIDIOCGRDESC)
+        return put_descriptor(m, arg);
+    if (request == HIDIOCGRAWINFO) {
+        struct hidraw_devinfo info = {m->bus, (int16_t)m->vendor, (int16_t)m->product};
+        return put(arg, sizeof(info), &info, sizeof(info)) < 0 ? -EFAULT : 0;
+    }
+    size_t size = _IOC_SIZE(request);
+    if (_IOC_TYPE(request) != 'H')
+        return -ENOTTY;
+    if (_IOC_NR(request) == _IOC_NR(HIDIOCGRAWNAME(0)))
+        return put(arg, size, m->name, strlen(m->name) + 1);
+    if (_IOC_NR(request) == _IOC_NR(HIDIOCGRAWUNIQ(0)))
+        return put(arg, size, m->unique, strlen(m->unique) + 1);
+    return -EPIPE; // feature reports: this device has none
+}
+
+static gboolean on_ioctl(UMockdevIoctlBase *handler, UMockdevIoctlClient *client, gpointer data)
+{
+    (void)handler;
+    struct hid_device_emulated *d = data;
+    waiter_lock(&d->waiter);
+    int result = answer(d, umockdev_ioctl_client_get_request(client),
+                        umockdev_ioctl_client_get_arg(client));
+    waiter_unlock(&d->waiter);
+    umockdev_ioctl_client_complete(client, result < 0 ? -1 : result, result < 0 ? -result : 0);
+    return TRUE;
+}
+
+static void on_connected(UMockdevIoctlBase *handler, UMockdevIoctlClient *client, gpointer data)
+{
+    (void)handler, (void)client;
+    struct hid_device_emulated *d = data;
+    waiter_lock(&d->waiter);
+    d->clients++;
+    waiter_unlock(&d->waiter);
+}
+
+static void on_vanished(UMockdevIoctlBase *handler, UMockdevIoctlClient *client, gpointer data)
+{
+    (void)handler;
+    struct hid_device_emulated *d = data;
+    waiter_lock(&d->waiter);
+    if (d->reader == client)
+        d->reader = NULL;
+    d->clients--;
+    while (d->clients == 0 && d->queued > 0)
+        take(d);
+    waiter_unlock(&d->waiter);
+}
+
+// ---- the radio link ------------------------------------------------------------------
+
+static void describe_hid(const struct hid_device_emulated *d, GString *text)
+{
+    const struct hid_model *m = &d->model;
+    g_string_append_printf(text,
+                           "P: %s\nE: SUBSYSTEM=hid\nE: HID_ID=%04X:%08X:%08X\nE: HID_NAME=%s\n"
+                           "E: HID_PHYS=00:1f:00:00:00:01\nE: HID_UNIQ=%s\n"
+                           "E: MODALIAS=hid:b%04Xg0001v%08Xp%08X\nH: report_descriptor=",
+                           d->hid_path, m->bus, m->vendor, m->product, m->name, m->unique, m->bus,
+                           m->vendor, m->product);
+    for (size_t i = 0; i < m->descriptor_size; i++)
+        g_string_append_printf(text, "%02x", m->descriptor[i]);
+    g_string_append_c(text, '\n');
+}
+
+// hidapi finds a device by the number of its node, so the terminal's stands here.
+static void describe_hidraw(const struct hid_device_emulated *d, GString *text)
+{
+    g_string_append_printf(text,
+                           "P: %s\nN: %s=00\nE: SUBSYSTEM=hidraw\nE: DEVNAME=%s\nE: MAJOR=%d\n"
+                           "E: MINOR=%d\nA: dev=%d:%d\\n\nL: device=../../../%s\n",
+                           d->hidraw_path, d->devnode + strlen("/dev/"), d->devnode,
+                           d->node.major_number, d->node.minor_number, d->node.major_number,
+                           d->node.minor_number, strrchr(d->hid_path, '/') + 1);
+}
+
+static bool add(struct hid_device_emulated *d,
+                void (*describe)(const struct hid_device_emulated *, GString *),
+                struct error *err)
+{
+    GError *problem = NULL;
+    GString *text = g_string_new(NULL);
+    describe(d, text);
+    bool added = umockdev_testbed_add_from_string(d->testbed, text->str, &problem);
+    g_string_free(text, TRUE);
+    if (!added) {
+        fail(err, ERROR_SYSTEM, "emulating %s: %s", d->devnode, problem->message);
+        g_error_free(problem);
+    }
+    return added;
+}
+
+static void syspath(char sys[256], const char *path)
+{
+    snprintf(sys, 256, "/sys%s", path);
+}
+
+static void uevent(struct hid_device_emulated *d, const char *path, const char *action)
+{
+    char sys[256];
+    syspath(sys, path);
+    umockdev_testbed_uevent(d->testbed, sys, action);
+}
+
+static void remove_from_sysfs(struct hid_device_emulated *d, const char *path)
+{
+    char sys[256];
+    syspath(sys, path);
+    umockdev_testbed_uevent(d->testbed, sys, "remove");
+    umockdev_testbed_remove_device(d->testbed, sys);
+}
+
+static bool show(struct hid_device_emulated *d, struct error *err)
+{
+    GError *problem = NULL;
+    if (!umockdev_testbed_attach_ioctl(d->testbed, d->devnode, d->handler, &problem)) {
+        fail(err, ERROR_SYSTEM, "emulating %s: %s", d->devnode, problem->message);
+        g_error_free(problem);
+        return false;
+    }
+    if (add(d, describe_hid, err) && add(d, describe_hidraw, err) &&
+        node_link(&d->node, d->testbed, d->devnode, err)) {
+        uevent(d, d->hid_path, "add");
+        uevent(d, d->hidraw_path, "add");
+        return true;
+    }
+    umockdev_testbed_detach_ioctl(d->testbed, d->devnode, NULL);
+    return false;
+}
+
+bool hid_plug(struct hid_device_emulated *device, struct error *err)
+{
+    struct hid_device_emulated *d = device;
+    if (d->plugged)
+        return true;
+    if (!node_open(&d->node, err))
+        return false;
+    const struct hid_model *m = &d->model;
+    d->number++;
+    snprintf(d->devnode, sizeof(d->devnode), "/dev/hidraw%d", d->number - 1);
+    snprintf(d->hid_path, sizeof(d->hid_path), "/devices/virtual/misc/uhid/%04X:%04X:%04X.%04X",
+             m->bus, m->vendor, m->product, d->number);
+    snprintf(d->hidraw_path, sizeof(d->hidraw_path), "%s/hidraw/hidraw%d", d->hid_path,
+             d->number - 1);
+    waiter_lock(&d->waiter);
+    d->plugged = true;
+    waiter_wake(&d->waiter);
+    waiter_unlock(&d->waiter);
+    if (show(d, err))
+        return true;
+    d->plugged = false;
+    node_close(&d->node);
+    return false;
+}
+
+void hid_unplug(struct hid_device_emulated *device)
+{
+    struct hid_device_emulated *d = device;
+    if (!d->plugged)
+        return;
+    waiter_lock(&d->waiter);
+    d->plugged = false;
+    d->queued = 0;
+    if (d->reader)
+        umockdev_ioctl_client_complete(d->reader, -1, EIO);
+    d->reader = NULL;
+    waiter_unlock(&d->waiter);
+    remove_from_sysfs(d, d->hidraw_path);
+    remove_from_sysfs(d, d->hid_path);
+    umockdev_testbed_detach_ioctl(d->testbed, d->devnode, NULL);
+    waiter_lock(&d->waiter);
+    node_close(&d->node);
+    waiter_unlock(&d->waiter);
+}
+
+struct hid_device_emulated *hid_emulate(UMockdevTestbed *testbed, const struct hid_model *model,
+                                        uint64_t seed, struct error *err)
+{
+    struct hid_device_emulated *d = calloc(1, sizeof(*d));
+    if (!d) {
+        fail(err, ERROR_SYSTEM, "out of memory");
+        return NULL;
+    }
+    d->testbed = testbed;
+    d->model = *model;
+    d->node.master = d->node.slave = -1;
+    noise_init(&d->noise, seed, 'h');
+    waiter_init(&d->waiter);
+    d->handler = umockdev_ioctl_base_new();
+    g_signal_connect(d->handler, "handle-ioctl", G_CALLBACK(on_ioctl), d);
+    g_signal_connect(d->handler, "handle-read", G_CALLBACK(on_read), d);
+    g_signal_connect(d->handler, "handle-write", G_CALLBACK(on_write), d);
+    g_signal_connect(d->handler, "client-connected", G_CALLBACK(on_connected), d);
+    g_signal_connect(d->handler, "client-vanished", G_CALLBACK(on_vanished), d);
+    d->running = pthread_create(&d->thread, NULL, run, d) == 0;
+    if (d->running)
+        return d;
+    fail(err, ERROR_SYSTEM, "starting a thread");
+    hid_emulation_end(d);
+    return NULL;
+}
+
+void hid_set_fault(struct hid_device_emulated *device, enum wire_fault fault)
+{
+    waiter_lock(&device->waiter);
+    device->fault = fault;
+    waiter_unlock(&device->waiter);
+}
+
+void hid_with_model(struct hid_device_emulated *device, void (*act)(void *context),
+                    void *context)
+{
+    waiter_lock(&device->waiter);
+    act(context);
+    waiter_wake(&device->waiter);
+    waiter_unlock(&device->waiter);
+}
+
+void hid_emulation_end(struct hid_device_emulated *device)
+{
+    struct hid_device_emulated *d = device;
+    if (!d)
+        return;
+    hid_unplug(d);
+    if (d->running) {
+        waiter_lock(&d->waiter);
+        d->stopping = true;
+        waiter_wake(&d->waiter);
+        waiter_unlock(&d->waiter);
+        pthread_join(d->thread, NULL);
+    }
+    g_signal_handlers_disconnect_by_data(d->handler, d);
+    g_object_unref(d->handler);
+    waiter_fini(&d->waiter);
+    free(d);
+}

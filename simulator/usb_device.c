@@ -1,0 +1,526 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulator/usb_device.h"
+
+#include <linux/usbdevice_fs.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/ioctl.h>
+
+#include "base/clock.h"
+#include "simulator/wire_fault.h"
+#include "simulator/wire_node.h"
+#include "simulator/wire_wait.h"
+
+enum { URBS = 64, FIRST_NUMBER = 2, SETUP_SIZE = 8, DESCRIPTOR_DEVICE = 18 };
+
+#define SYSFS "/sys/devices/usb1/1-1"
+
+struct urb {
+    UMockdevIoctlData *data, *buffer; // struct usbdevfs_urb; what it points to
+    UMockdevIoctlClient *owner;       // compared only
+    unsigned long address;            // of the struct in the host program
+    uint8_t type, endpoint;
+    size_t length, actual;
+    int status;
+};
+
+struct urbs {
+    struct urb items[URBS];
+    int count;
+};
+
+struct usb_device {
+    UMockdevTestbed *testbed;
+    UMockdevIoctlBase *handler;
+    struct usb_model model;
+    struct node node;
+    char devnode[32];
+    int number;
+
+    struct waiter waiter; // its lock guards everything below and the model
+    pthread_t thread;
+    bool running, stopping, plugged;
+    struct urbs pending, done;
+    enum wire_fault fault;
+    bool stall_armed;
+    uint32_t halted; // bit n: IN endpoint n stalled by a fault
+    struct noise noise;
+};
+
+// ---- request blocks ------------------------------------------------------------
+
+static struct urb take(struct urbs *urbs, int at)
+{
+    struct urb urb = urbs->items[at];
+    urbs->count--;
+    memmove(urbs->items + at, urbs->items + at + 1,
+            (size_t)(urbs->count - at) * sizeof(urbs->items[0]));
+    return urb;
+}
+
+static void drop(struct urb *urb)
+{
+    g_clear_object(&urb->buffer);
+    g_clear_object(&urb->data);
+}
+
+static void finish(struct usb_device *d, int at, int status)
+{
+    struct urb urb = take(&d->pending, at);
+    urb.status = status;
+    if (d->done.count == URBS)
+        drop(&urb);
+    else
+        d->done.items[d->done.count++] = urb;
+    node_set_writable(&d->node, true);
+}
+
+static int find(const struct urbs *urbs, const UMockdevIoctlClient *owner, unsigned long address)
+{
+    for (int i = 0; i < urbs->count; i++)
+        if (urbs->items[i].owner == owner && (!address || urbs->items[i].address == address))
+            return i;
+    return -1;
+}
+
+static void drop_of(struct urbs *urbs, const UMockdevIoctlClient *owner)
+{
+    for (int at = find(urbs, owner, 0); at >= 0; at = find(urbs, owner, 0)) {
+        struct urb urb = take(urbs, at);
+        drop(&urb);
+    }
+}
+
+// ---- transfers -------------------------------------------------------------------
+
+static size_t packet_size(const struct usb_device *d)
+{
+    return d->model.megabits == 480 ? 512 : 64;
+}
+
+static void drain(struct usb_device *d, uint8_t endpoint, int64_t now_ns)
+{
+    uint8_t packet[USB_PACKET_MOST];
+    int64_t again_ns;
+    while (d->model.in(d->model.context, endpoint, now_ns, packet, &again_ns) >= 0)
+        continue;
+}
+
+// One packet as the fault lets it through; -EAGAIN when nothing arrives.
+static int next_packet(struct usb_device *d, uint8_t endpoint, int64_t now_ns,
+                       uint8_t packet[USB_PACKET_MOST], int64_t *again_ns)
+{
+    uint32_t bit = 1u << (endpoint & 0x0F);
+    if (d->halted & bit)
+        return -EPIPE;
+    int size = d->model.in(d->model.context, endpoint, now_ns, packet, again_ns);
+    if (size < 0 || d->fault == WIRE_FINE)
+        return size;
+    if (d->stall_armed) {
+        d->stall_armed = false;
+        d->halted |= bit;
+        drain(d, endpoint, now_ns);
+        return -EPIPE;
+    }
+    if (d->fault == WIRE_SHORT || d->fault == WIRE_SILENT)
+        drain(d, endpoint, now_ns);
+    size = (int)fault_on(d->fault, &d->noise, packet, (size_t)size);
+    return size == 0 && d->fault == WIRE_SILENT ? -EAGAIN : size;
+}
+
+// 1 = goes on waiting, else the status it ends with.
+static int transfer_in(struct usb_device *d, struct urb *urb, int64_t now_ns, int64_t *again_ns)
+{
+    for (;;) {
+        uint8_t packet[USB_PACKET_MOST];
+        int size = next_packet(d, urb->endpoint, now_ns, packet, again_ns);
+        if (size == -EAGAIN)
+            return 1;
+        if (size < 0)
+            return size;
+        size_t room = urb->length - urb->actual;
+        bool overflow = (size_t)size > room;
+        size_t count = overflow ? room : (size_t)size;
+        if (count)
+            memcpy(urb->buffer->data + urb->actual, packet, count);
+        urb->actual += count;
+        if (overflow)
+            return -EOVERFLOW;
+        if ((size_t)size < packet_size(d) || urb->actual == urb->length)
+            return 0;
+    }
+}
+
+static int transfer_out(struct usb_device *d, struct urb *urb, int64_t now_ns)
+{
+    const uint8_t *bytes = urb->buffer ? urb->buffer->data : NULL;
+    int status = d->model.out(d->model.context, urb->endpoint, now_ns, bytes, urb->length);
+    urb->actual = status == 0 ? urb->length : 0;
+    return status;
+}
+
+static size_t string_descriptor(const struct usb_device *d, int index, uint8_t *out)
+{
+    const char *text = index == 0 ? "" : index < 4 ? d->model.strings[index] : NULL;
+    if (!text)
+        return 0;
+    size_t size = 2;
+    for (; *text && size < 254; text++, size += 2) {
+        out[size] = (uint8_t)*text;
+        out[size + 1] = 0;
+    }
+    if (index == 0) { // the one language: US English
+        out[2] = 0x09;
+        out[3] = 0x04;
+        size = 4;
+    }
+    out[0] = (uint8_t)size;
+    out[1] = 3;
+    return size;
+}
+
+static int transfer_control(struct usb_device *d, struct urb *urb)
+{
+    uint8_t *setup = urb->buffer ? urb->buffer->data : NULL, text[256];
+    if (!setup || urb->length < SETUP_SIZE || setup[0] != 0x80 || setup[1] != 6)
+        return -EPIPE;
+    const uint8_t *from = NULL;
+    size_t size = 0, wanted = (size_t)setup[6] | (size_t)setup[7] << 8;
+    if (setup[3] == 1 || setup[3] == 2) {
+        from = d->model.descriptors + (setup[3] == 2 ? DESCRIPTOR_DEVICE : 0);
+        size = setup[3] == 2 ? d->model.descriptors_size - DESCRIPTOR_DEVICE : DESCRIPTOR_DEVICE;
+    } else if (setup[3] == 3) {
+        size = string_descriptor(d, setup[2], text);
+        from = text;
+    }
+    if (size == 0)
+        return -EPIPE;
+    size = size < wanted ? size : wanted;
+    size = size < urb->length - SETUP_SIZE ? size : urb->length - SETUP_SIZE;
+    memcpy(setup + SETUP_SIZE, from, size);
+    urb->actual = size;
+    return 0;
+}
+
+static int transfer(struct usb_device *d, struct urb *urb, int64_t now_ns, int64_t *again_ns)
+{
+    if (urb->type == USBDEVFS_URB_TYPE_CONTROL)
+        return transfer_control(d, urb);
+    if (urb->type != USBDEVFS_URB_TYPE_BULK)
+        return -EINVAL;
+    if (urb->endpoint & 0x80)
+        return transfer_in(d, urb, now_ns, again_ns);
+    return transfer_out(d, urb, now_ns);
+}
+
+// Moves every transfer as far as it goes; those of one endpoint wait for each
+// other. Returns when to come back.
+static int64_t pump(struct usb_device *d)
+{
+    int64_t now_ns = clock_now_ns(), again_ns = INT64_MAX;
+    bool busy[256] = {false};
+    for (int i = 0; i < d->pending.count;) {
+        struct urb *urb = &d->pending.items[i];
+        int64_t this_ns = INT64_MAX;
+        int status = busy[urb->endpoint] ? 1 : transfer(d, urb, now_ns, &this_ns);
+        if (status == 1) {
+            busy[urb->endpoint] = true;
+            again_ns = this_ns < again_ns ? this_ns : again_ns;
+            i++;
+        } else {
+            finish(d, i, status);
+        }
+    }
+    return again_ns;
+}
+
+static void *run(void *argument)
+{
+    struct usb_device *d = argument;
+    waiter_lock(&d->waiter);
+    while (!d->stopping) {
+        int64_t again_ns = d->plugged ? pump(d) : INT64_MAX;
+        waiter_wait(&d->waiter, again_ns);
+    }
+    waiter_unlock(&d->waiter);
+    return NULL;
+}
+
+// ---- usbfs -----------------------------------------------------------------------
+
+static int submit(struct usb_device *d, UMockdevIoctlClient *client, UMockdevIoctlData *arg)
+{
+    if (d->pending.count == URBS)
+        return -ENOMEM;
+    struct urb urb = {.owner = client};
+    urb.data = umockdev_ioctl_data_resolve(arg, 0, sizeof(struct usbdevfs_urb), NULL);
+    if (!urb.data)
+        return -EFAULT;
+    const struct usbdevfs_urb *u = (const struct usbdevfs_urb *)(const void *)urb.data->data;
+    urb.address = urb.data->client_addr;
+    urb.type = u->type;
+    urb.endpoint = u->endpoint;
+    urb.length = u->buffer_length > 0 ? (size_t)u->buffer_length : 0;
+    if (urb.length)
+        urb.buffer = umockdev_ioctl_data_resolve(
+            urb.data, offsetof(struct usbdevfs_urb, buffer), urb.length, NULL);
+    if (urb.length && !urb.buffer) {
+        drop(&urb);
+        return -EFAULT;
+    }
+    d->pending.items[d->pending.count++] = urb;
+    pump(d);
+    waiter_wake(&d->waiter);
+    return 0;
+}
+
+static int reap(struct usb_device *d, UMockdevIoctlClient *client, UMockdevIoctlData *arg)
+{
+    int at = find(&d->done, client, 0);
+    if (at < 0)
+        return d->plugged ? -EAGAIN : -ENODEV;
+    UMockdevIoctlData *pointer = umockdev_ioctl_data_resolve(arg, 0, sizeof(void *), NULL);
+    if (!pointer)
+        return -EFAULT;
+    struct urb urb = take(&d->done, at);
+    struct usbdevfs_urb *u = (struct usbdevfs_urb *)(void *)urb.data->data;
+    u->status = urb.status;
+    u->actual_length = (int)urb.actual;
+    umockdev_ioctl_data_set_ptr(pointer, 0, urb.data);
+    drop(&urb);
+    g_object_unref(pointer);
+    node_set_writable(&d->node, d->done.count > 0);
+    return 0;
+}
+
+static int discard(struct usb_device *d, UMockdevIoctlClient *client, UMockdevIoctlData *arg)
+{
+    unsigned long address;
+    memcpy(&address, arg->data, sizeof(address));
+    int at = find(&d->pending, client, address);
+    if (at < 0)
+        return -EINVAL;
+    finish(d, at, -ENOENT);
+    return 0;
+}
+
+static int get_capabilities(UMockdevIoctlData *arg)
+{
+    UMockdevIoctlData *out = umockdev_ioctl_data_resolve(arg, 0, sizeof(guint32), NULL);
+    if (!out)
+        return -EFAULT;
+    guint32 capabilities = USBDEVFS_CAP_ZERO_PACKET | USBDEVFS_CAP_BULK_CONTINUATION |
+                           USBDEVFS_CAP_NO_PACKET_SIZE_LIM | USBDEVFS_CAP_BULK_SCATTER_GATHER |
+                           USBDEVFS_CAP_REAP_AFTER_DISCONNECT;
+    memcpy(out->data, &capabilities, sizeof(capabilities));
+    g_object_unref(out);
+    return 0;
+}
+
+static int clear_halt(struct usb_device *d, UMockdevIoctlData *arg)
+{
+    UMockdevIoctlData *in = umockdev_ioctl_data_resolve(arg, 0, sizeof(unsigned int), NULL);
+    if (!in)
+        return -EFAULT;
+    uint8_t endpoint = in->data[0];
+    g_object_unref(in);
+    if (endpoint & 0x80)
+        d->halted &= ~(1u << (endpoint & 0x0F));
+    d->model.clear_halt(d->model.context, endpoint);
+    return 0;
+}
+
+static int answer(struct usb_device *d, UMockdevIoctlClient *client)
+{
+    UMockdevIoctlData *arg = umockdev_ioctl_client_get_arg(client);
+    gulong request = umockdev_ioctl_client_get_request(client);
+    if (request == USBDEVFS_REAPURBNDELAY || request == USBDEVFS_REAPURB)
+        return reap(d, client, arg);
+    if (!d->plugged)
+        return -ENODEV;
+    switch (request) {
+    case USBDEVFS_SUBMITURB:
+        return submit(d, client, arg);
+    case USBDEVFS_DISCARDURB:
+        return discard(d, client, arg);
+    case USBDEVFS_GET_CAPABILITIES:
+        return get_capabilities(arg);
+    case USBDEVFS_CLEAR_HALT:
+        return clear_halt(d, arg);
+    case USBDEVFS_CLAIMINTERFACE:
+    case USBDEVFS_RELEASEINTERFACE:
+    case USBDEVFS_SETCONFIGURATION:
+    case USBDEVFS_SETINTERFACE:
+    case USBDEVFS_RESET:
+        return 0;
+    case USBDEVFS_GETDRIVER:
+        return -ENODATA;
+    default:
+        return -ENOTTY;
+    }
+}
+
+static gboolean on_ioctl(UMockdevIoctlBase *handler, UMockdevIoctlClient *client, gpointer data)
+{
+    (void)handler;
+    struct usb_device *d = data;
+    waiter_lock(&d->waiter);
+    int result = answer(d, client);
+    waiter_unlock(&d->waiter);
+    umockdev_ioctl_client_complete(client, result < 0 ? -1 : 0, result < 0 ? -result : 0);
+    return TRUE;
+}
+
+static void on_vanished(UMockdevIoctlBase *handler, UMockdevIoctlClient *client, gpointer data)
+{
+    (void)handler;
+    struct usb_device *d = data;
+    waiter_lock(&d->waiter);
+    drop_of(&d->pending, client);
+    drop_of(&d->done, client);
+    waiter_unlock(&d->waiter);
+}
+
+// ---- the plug ----------------------------------------------------------------------
+
+static void describe(const struct usb_device *d, GString *text)
+{
+    const struct usb_model *m = &d->model;
+    const uint8_t *b = m->descriptors;
+    g_string_append_printf(text,
+                           "P: /devices/usb1/1-1\nN: bus/usb/001/%03d\nE: SUBSYSTEM=usb\n"
+                           "E: DRIVER=usb\nE: BUSNUM=001\nE: DEVNUM=%03d\n"
+                           "E: DEVNAME=/dev/bus/usb/001/%03d\nE: DEVTYPE=usb_device\n"
+                           "E: PRODUCT=%x/%x/%x\nE: MAJOR=189\nE: MINOR=%d\n",
+                           d->number, d->number, d->number, b[8] | b[9] << 8, b[10] | b[11] << 8,
+                           b[12] | b[13] << 8, d->number - 1);
+    g_string_append_printf(text,
+                           "A: bConfigurationValue=1\\n\nA: busnum=1\\n\nA: devnum=%d\\n\n"
+                           "A: speed=%d\\n\nA: idVendor=%02x%02x\\n\nA: idProduct=%02x%02x\\n\n"
+                           "A: manufacturer=%s\\n\nA: product=%s\\n\nA: serial=%s\\n\n"
+                           "A: dev=189:%d\\n\nH: descriptors=",
+                           d->number, m->megabits, b[9], b[8], b[11], b[10], m->strings[1],
+                           m->strings[2], m->strings[3], d->number - 1);
+    for (size_t i = 0; i < m->descriptors_size; i++)
+        g_string_append_printf(text, "%02x", b[i]);
+    g_string_append_c(text, '\n');
+}
+
+static bool show(struct usb_device *d, struct error *err)
+{
+    GError *problem = NULL;
+    if (!umockdev_testbed_attach_ioctl(d->testbed, d->devnode, d->handler, &problem)) {
+        fail(err, ERROR_SYSTEM, "emulating %s: %s", d->devnode, problem->message);
+        g_error_free(problem);
+        return false;
+    }
+    GString *text = g_string_new(NULL);
+    describe(d, text);
+    bool added = umockdev_testbed_add_from_string(d->testbed, text->str, &problem);
+    g_string_free(text, TRUE);
+    if (added && node_link(&d->node, d->testbed, d->devnode, err)) {
+        umockdev_testbed_uevent(d->testbed, SYSFS, "add");
+        return true;
+    }
+    if (!added) {
+        fail(err, ERROR_SYSTEM, "emulating %s: %s", d->devnode, problem->message);
+        g_error_free(problem);
+    }
+    umockdev_testbed_detach_ioctl(d->testbed, d->devnode, NULL);
+    return false;
+}
+
+bool usb_device_plug(struct usb_device *device, struct error *err)
+{
+    struct usb_device *d = device;
+    if (d->plugged)
+        return true;
+    if (!node_open(&d->node, err))
+        return false;
+    snprintf(d->devnode, sizeof(d->devnode), "/dev/bus/usb/001/%03d", ++d->number);
+    waiter_lock(&d->waiter);
+    node_set_writable(&d->node, false);
+    d->halted = 0;
+    d->plugged = true;
+    waiter_unlock(&d->waiter);
+    if (show(d, err))
+        return true;
+    d->plugged = false;
+    node_close(&d->node);
+    return false;
+}
+
+void usb_device_unplug(struct usb_device *device)
+{
+    struct usb_device *d = device;
+    if (!d->plugged)
+        return;
+    waiter_lock(&d->waiter);
+    d->plugged = false;
+    while (d->pending.count > 0)
+        finish(d, 0, -ESHUTDOWN);
+    waiter_unlock(&d->waiter);
+    umockdev_testbed_uevent(d->testbed, SYSFS, "remove");
+    umockdev_testbed_remove_device(d->testbed, SYSFS);
+    umockdev_testbed_detach_ioctl(d->testbed, d->devnode, NULL);
+    waiter_lock(&d->waiter);
+    node_close(&d->node);
+    waiter_unlock(&d->waiter);
+}
+
+struct usb_device *usb_device_create(UMockdevTestbed *testbed, const struct usb_model *model,
+                                     uint64_t seed, struct error *err)
+{
+    struct usb_device *d = calloc(1, sizeof(*d));
+    if (!d) {
+        fail(err, ERROR_SYSTEM, "out of memory");
+        return NULL;
+    }
+    d->testbed = testbed;
+    d->model = *model;
+    d->number = FIRST_NUMBER - 1;
+    d->node.master = d->node.slave = -1;
+    noise_init(&d->noise, seed, 'u');
+    waiter_init(&d->waiter);
+    d->handler = umockdev_ioctl_base_new();
+    g_signal_connect(d->handler, "handle-ioctl", G_CALLBACK(on_ioctl), d);
+    g_signal_connect(d->handler, "client-vanished", G_CALLBACK(on_vanished), d);
+    d->running = pthread_create(&d->thread, NULL, run, d) == 0;
+    if (d->running)
+        return d;
+    fail(err, ERROR_SYSTEM, "starting a thread");
+    usb_device_destroy(d);
+    return NULL;
+}
+
+void usb_device_set_fault(struct usb_device *device, enum wire_fault fault)
+{
+    waiter_lock(&device->waiter);
+    device->fault = fault;
+    device->stall_armed = fault == WIRE_STALL;
+    waiter_wake(&device->waiter);
+    waiter_unlock(&device->waiter);
+}
+
+void usb_device_destroy(struct usb_device *device)
+{
+    struct usb_device *d = device;
+    if (!d)
+        return;
+    usb_device_unplug(d);
+    if (d->running) {
+        waiter_lock(&d->waiter);
+        d->stopping = true;
+        waiter_wake(&d->waiter);
+        waiter_unlock(&d->waiter);
+        pthread_join(d->thread, NULL);
+    }
+    g_signal_handlers_disconnect_by_data(d->handler, d);
+    g_object_unref(d->handler);
+    for (; d->done.count > 0; d->done.count--)
+        drop(&d->done.items[d->done.count - 1]);
+    waiter_fini(&d->waiter);
+    free(d);
+}

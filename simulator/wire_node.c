@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulator/wire_node.h"
+
+#include <fcntl.h>
+#include <pty.h>
+#include <stdio.h>
+#include <sys/stat.h>
+#include <sys/sysmacros.h>
+#include <termios.h>
+#include <unistd.h>
+
+bool node_open(struct node *node, struct error *err)
+{
+    *node = (struct node){.master = -1, .slave = -1};
+    if (openpty(&node->master, &node->slave, node->slave_path, NULL, NULL) != 0)
+        return fail_errno(err, "opening a pseudo terminal");
+    fcntl(node->master, F_SETFD, FD_CLOEXEC);
+    fcntl(node->slave, F_SETFD, FD_CLOEXEC);
+    struct termios raw;
+    tcgetattr(node->slave, &raw);
+    cfmakeraw(&raw);
+    tcsetattr(node->slave, TCSANOW, &raw);
+    struct stat about;
+    fstat(node->slave, &about);
+    node->major_number = (int)major(about.st_rdev);
+    node->minor_number = (int)minor(about.st_rdev);
+    return true;
+}
+
+bool node_link(struct node *node, UMockdevTestbed *testbed, const char *devnode,
+               struct error *err)
+{
+    char fresh[sizeof(node->path) + 4];
+    char *root = umockdev_testbed_get_root_dir(testbed);
+    snprintf(node->path, sizeof(node->path), "%s%s", root, devnode);
+    g_free(root);
+    snprintf(fresh, sizeof(fresh), "%s.new", node->path);
+    unlink(fresh);
+    if (symlink(node->slave_path, fresh) != 0 || rename(fresh, node->path) != 0)
+        return fail_errno(err, "linking %s", node->path);
+    return true;
+}
+
+void node_set_writable(struct node *node, bool writable)
+{
+    tcflow(node->slave, writable ? TCOON : TCOOFF);
+}
+
+void node_set_readable(struct node *node, bool readable)
+{
+    if (!readable)
+        tcflush(node->slave, TCIFLUSH);
+    else if (write(node->master, "", 1) != 1)
+        return; // a full terminal is readable already
+}
+
+void node_close(struct node *node)
+{
+    if (node->master < 0)
+        return;
+    if (node->path[0])
+        unlink(node->path);
+    close(node->slave);
+    close(node->master);
+    node->master = node->slave = -1;
+}

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// A device node of the testbed that can be polled: the path under /dev leads
+// to a pseudo terminal whose own readiness stands for that of the device, as
+// umockdev's nodes are always ready. Closing it hangs up on whoever has it open.
+#ifndef SIMULATOR_WIRE_NODE_H
+#define SIMULATOR_WIRE_NODE_H
+
+#include <stdbool.h>
+#include <umockdev.h>
+
+#include "base/error.h"
+
+struct node {
+    int master, slave;
+    int major_number, minor_number; // of the slave
+    char path[256];                 // of the link inside the testbed
+    char slave_path[64];
+};
+
+// Opens the pseudo terminal, raw and not inherited by child processes.
+bool node_open(struct node *node, struct error *err);
+
+// Puts a link to it at devnode ("/dev/hidraw0") of the testbed, in place of
+// what is there.
+bool node_link(struct node *node, UMockdevTestbed *testbed, const char *devnode,
+               struct error *err);
+
+// Whether the host may write (usbfs: whether something can be reaped).
+void node_set_writable(struct node *node, bool writable);
+
+// Whether the host may read. Call on changes only.
+void node_set_readable(struct node *node, bool readable);
+
+// Removes the link and hangs up. Accepts a node closed before (master < 0).
+void node_close(struct node *node);
+
+#endif
