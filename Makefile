@@ -105,7 +105,7 @@ $(BUILD)/$(1): $(BUILD)/$($(1)_in)/$(1).o $(call archives,$($(1)_in) $(call belo
 endef
 $(foreach p,$(PROGRAMS),$(eval $(call program_rule,$(p))))
 
-$(BUILD)/tests/whole/%: $(BUILD)/tests/whole/%.o $(call object,$(FAKES)) $(call archives,base files colorimetry) all
+$(BUILD)/tests/whole/%: $(BUILD)/tests/whole/%.o $(call object,$(FAKES)) $(call archives,base files colorimetry) $(PROGRAMS:%=$(BUILD)/%)
 	$(CC) -o $@ $< $(call object,$(FAKES)) $(call libs,base files colorimetry) -lcmocka
 
 $(call object,render/program.c): $(BUILD)/render/shaders_embedded.inc
@@ -115,7 +115,9 @@ links: $(FOLDERS:%=$(BUILD)/links/%)
 layers:
 	tests/layers.sh
 
-check: layers links
+check:
+	@$(MAKE) -s deps
+	$(MAKE) layers links
 	$(MAKE) check-here
 	$(MAKE) BUILD=$(BUILD)/asan FLAVOUR=sanitize check-here
 	@tests/run.sh --total $(BUILD)/results $(BUILD)/asan/results
