@@ -259,7 +259,26 @@ static void take_attributes(exr_context_t context, struct exr *image)
     }
 }
 
-static bool take_header(exr_context_t context, const struct stream *stream, struct exr *image,
+// Looks at every chunk before pixels are allocated, so that a header that
+// promises more than the file holds costs nothing. Deflate packs at most
+// 1032:1, run lengths 64:1.
+static bool check_chunks(exr_context_t context, int first_line, int width, int height)
+{
+    exr_chunk_info_t chunk;
+    for (int row = 0; row < height; row += chunk.height) {
+        if (exr_read_scanline_chunk_info(context, 0, first_line + row, &chunk))
+            return false;
+        if (chunk.start_y != first_line + row || chunk.height < 1 || chunk.height > height - row ||
+            chunk.width != width)
+            return false;
+        if (chunk.compression != EXR_COMPRESSION_PIZ &&
+            chunk.unpacked_size > 1100 * (chunk.packed_size + 16))
+            return false;
+    }
+    return true;
+}
+
+static bool take_header(exr_context_t context, struct stream *stream, struct exr *image,
                         int *first_line, struct error *err)
 {
     exr_attr_box2i_t window;
@@ -269,9 +288,13 @@ static bool take_header(exr_context_t context, const struct stream *stream, stru
     int64_t width = (int64_t)window.max.x - window.min.x + 1;
     int64_t height = (int64_t)window.max.y - window.min.y + 1;
     bool sane = width >= 1 && width <= SIDE_MOST && height >= 1 && height <= SIDE_MOST;
-    if (!exr_init(image, sane ? width : 0, sane ? height : 0, list->num_channels, err))
+    if (!check_size(sane ? width : 0, sane ? height : 0, list->num_channels, err))
         return while_doing(err, "%s", stream->path);
     *first_line = window.min.y;
+    if (!check_chunks(context, window.min.y, width, height))
+        return malformed(stream, err);
+    if (!exr_init(image, width, height, list->num_channels, err))
+        return while_doing(err, "%s", stream->path);
     take_attributes(context, image);
     return take_channels(list, stream, image, err);
 }
@@ -300,9 +323,6 @@ static bool decode(exr_context_t context, exr_decode_pipeline_t *pipeline, struc
     exr_chunk_info_t chunk;
     for (int row = 0; row < image->height; row += chunk.height) {
         if (exr_read_scanline_chunk_info(context, 0, first_line + row, &chunk))
-            return false;
-        if (chunk.start_y != first_line + row || chunk.height < 1 ||
-            chunk.height > image->height - row || chunk.width != image->width)
             return false;
         if (row ? exr_decoding_update(context, 0, &chunk, pipeline)
                 : exr_decoding_initialize(context, 0, &chunk, pipeline))
