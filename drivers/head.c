@@ -12,13 +12,17 @@ static const struct vec3 models[][POSE_POINTS] = {
 static const double nearest_m = 0.15, farthest_m = 3;
 static const double most_residual_px = 4;
 static const double most_turn = 75 * M_PI / 180;   // from facing the camera, any axis
-static const double most_unlike = 0.25;            // of the blobs' shape, 0..1
+static const double most_roll = 50 * M_PI / 180;   // within the image
+static const double most_unlike = 0.15;            // of the blobs' shape, 0..1
+static const double nearly_alike = 0.04;           // orders worth a second look
+static const double turn_step = 20 * M_PI / 180;   // between the heads tried at first
+static const double handicap_per_step = 0.005;     // so that a strange turn needs a reason
 static const double pull_per_m = 5;                // rad of rotation a metre is worth
 static const double alike = 0.1;                   // rad
 static const double same_eye_m = 0.015;
 static const double jump_m = 0.10, speed_m_s = 3;  // faster is no head
 static const int64_t memory_ns = NS_PER_S;
-enum { JUMPS_BELIEVED = 3, CANDIDATES = POSE_MOST + 1 };
+enum { JUMPS_BELIEVED = 3, MATCHES = 24, CANDIDATES = POSE_MOST + 1, CHOICES = 64 };
 
 const struct vec3 *head_markers(int marker)
 {
@@ -42,7 +46,7 @@ static double unlikeness(const double complex seen[POSE_POINTS],
         seen_size += creal(a * conj(a));
         model_size += creal(b * conj(b));
     }
-    if (seen_size <= 0 || fabs(carg(product)) > most_turn)
+    if (seen_size <= 0 || fabs(carg(product)) > most_roll)
         return 1;
     return 1 - creal(product * conj(product)) / (seen_size * model_size);
 }
@@ -63,32 +67,74 @@ static struct rigid facing(const double (*image)[2])
                           vec3_scale(z, 0.7)};
 }
 
-// Orders blobs as the markers; returns the unlikeness of the best order.
-static double assign(const struct head_memory *memory, const struct vec3 *markers,
-                     const double (*blobs)[2], int count, double image[POSE_POINTS][2])
+// One order of three blobs as the markers, and how well it fits.
+struct match {
+    double image[POSE_POINTS][2];
+    struct rigid guess; // the pose whose projection it resembles most
+    double unlike;
+};
+
+struct matches {
+    struct match of[MATCHES]; // one per order of blobs, index = order
+    int count;
+};
+
+// Every order of three blobs against one expected pose.
+static void try_pose(const struct rigid *pose, double handicap, const struct vec3 *markers,
+                     struct matches *m)
 {
-    double complex expected[POSE_POINTS], b[HEAD_BLOBS];
-    double best = 1;
-    struct rigid pose = memory->known ? memory->pose : facing(blobs);
+    double complex expected[POSE_POINTS], seen[POSE_POINTS];
     for (int i = 0; i < POSE_POINTS; i++) {
-        struct vec3 p = rigid_apply(pose, markers[i]);
+        struct vec3 p = rigid_apply(*pose, markers[i]);
         expected[i] = p.x / p.z + I * (p.y / p.z);
     }
-    for (int i = 0; i < count; i++)
-        b[i] = blobs[i][0] + I * blobs[i][1];
+    for (int order = 0; order < m->count; order++) {
+        struct match *one = &m->of[order];
+        for (int i = 0; i < POSE_POINTS; i++)
+            seen[i] = one->image[i][0] + I * one->image[i][1];
+        double unlike = unlikeness(seen, expected) + handicap;
+        if (unlike < one->unlike) {
+            one->unlike = unlike;
+            one->guess = *pose;
+        }
+    }
+}
+
+static void list_orders(const double (*blobs)[2], int count, struct matches *m)
+{
+    m->count = 0;
     for (int order = 0; order < count * count * count; order++) {
         int at[POSE_POINTS] = {order % count, order / count % count, order / count / count};
         if (at[0] == at[1] || at[1] == at[2] || at[0] == at[2])
             continue;
-        double unlike = unlikeness((double complex[]){b[at[0]], b[at[1]], b[at[2]]}, expected);
-        if (unlike >= best)
-            continue;
-        best = unlike;
+        struct match *one = &m->of[m->count++];
+        one->unlike = 1;
         for (int i = 0; i < POSE_POINTS; i++) {
-            image[i][0] = blobs[at[i]][0];
-            image[i][1] = blobs[at[i]][1];
+            one->image[i][0] = blobs[at[i]][0];
+            one->image[i][1] = blobs[at[i]][1];
         }
     }
+}
+
+// Against the last pose, or else against heads turned this way and that.
+// Returns the unlikeness of the best order.
+static double assign(const struct head_memory *memory, const struct vec3 *markers,
+                     const double (*blobs)[2], int count, struct matches *m)
+{
+    double best = 1;
+    list_orders(blobs, count, m);
+    const struct rigid front = facing(blobs);
+    if (memory->known)
+        try_pose(&memory->pose, 0, markers, m);
+    for (int yaw = -2; yaw <= 2 && !memory->known; yaw++)
+        for (int pitch = -2; pitch <= 1; pitch++) {
+            struct rigid turned = front;
+            turned.rotation = mat3_mul(front.rotation, mat3_mul(mat3_rotation(1, yaw * turn_step),
+                                                                mat3_rotation(0, pitch * turn_step)));
+            try_pose(&turned, handicap_per_step * (yaw * yaw + pitch * pitch), markers, m);
+        }
+    for (int i = 0; i < m->count; i++)
+        best = fmin(best, m->of[i].unlike);
     return best;
 }
 
@@ -116,13 +162,14 @@ static double angle_between(struct mat3 a, struct mat3 b)
 struct choice {
     struct rigid pose;
     double cost; // rad
+    double residual_px;
 };
 
-static bool plausible(const struct rigid *pose, const struct rigid *front, double residual_px)
+static bool plausible(const struct choice *one, const struct rigid *front)
 {
-    return residual_px <= most_residual_px && pose->translation.z >= nearest_m &&
-           pose->translation.z <= farthest_m &&
-           angle_between(pose->rotation, front->rotation) <= most_turn;
+    double z = one->pose.translation.z;
+    return one->residual_px <= most_residual_px && z >= nearest_m && z <= farthest_m &&
+           angle_between(one->pose.rotation, front->rotation) <= most_turn;
 }
 
 static double cost_of(const struct head_memory *memory, const struct rigid *pose,
@@ -134,19 +181,22 @@ static double cost_of(const struct head_memory *memory, const struct rigid *pose
     return angle_between(pose->rotation, memory->pose.rotation) + pull_per_m * vec3_length(moved);
 }
 
-// The plausible poses, cheapest first.
+// The plausible poses of all orders that fit nearly as well as the best,
+// cheapest first.
 static int choose(const struct head_memory *memory, const struct vec3 *markers,
-                  const double image[POSE_POINTS][2], double focal_px,
-                  struct choice choices[CANDIDATES])
+                  const struct match *match, double focal_px, struct choice *choices, int kept)
 {
+    const double (*image)[2] = match->image;
     struct rigid found[CANDIDATES], front = facing(image);
-    int count = pose_candidates(markers, image, found), kept = 0;
-    found[count++] = memory->known ? memory->pose : front;
-    for (int i = 0; i < count; i++) {
-        if (!pose_refine(markers, image, &found[i]) ||
-            !plausible(&found[i], &front, focal_px * residual(markers, image, &found[i])))
+    int count = pose_candidates(markers, image, found);
+    found[count++] = match->guess;
+    for (int i = 0; i < count && kept < CHOICES; i++) {
+        if (!pose_refine(markers, image, &found[i]))
             continue;
-        struct choice one = {found[i], cost_of(memory, &found[i], &front)};
+        struct choice one = {found[i], cost_of(memory, &found[i], &front),
+                             focal_px * residual(markers, image, &found[i])};
+        if (!plausible(&one, &front))
+            continue;
         int at = kept++;
         for (; at > 0 && choices[at - 1].cost > one.cost; at--)
             choices[at] = choices[at - 1];
@@ -179,22 +229,28 @@ void head_solve(struct head_memory *memory, const struct vec3 *markers, struct v
                 const double (*blobs)[2], int count, double focal_px, int64_t now_ns,
                 struct head_sample *out)
 {
-    double image[POSE_POINTS][2];
-    struct choice choices[CANDIDATES];
+    struct matches matches;
+    struct choice choices[CHOICES];
+    int found = 0;
     out->markers = count;
     out->eye = (struct vec3){0, 0, 0};
     out->reprojection_px = 0;
     out->status = TRACKER_LOST;
     if (now_ns - memory->seen_ns > memory_ns)
         *memory = (struct head_memory){0};
-    if (count < POSE_POINTS || assign(memory, markers, blobs, count, image) > most_unlike)
+    if (count < POSE_POINTS)
+        return;
+    double best = assign(memory, markers, blobs, count, &matches);
+    if (best > most_unlike)
         return;
     out->status = TRACKER_AMBIGUOUS;
-    int found = choose(memory, markers, image, focal_px, choices);
+    for (int i = 0; i < matches.count; i++)
+        if (matches.of[i].unlike <= best + nearly_alike)
+            found = choose(memory, markers, &matches.of[i], focal_px, choices, found);
     if (!found || undecided(choices, found, eye_from_marker))
         return;
     struct rigid pose = choices[0].pose;
-    out->reprojection_px = focal_px * residual(markers, image, &pose);
+    out->reprojection_px = choices[0].residual_px;
     if (jumped(memory, vec3_sub(pose.translation, memory->pose.translation), now_ns))
         return;
     *memory = (struct head_memory){true, pose, now_ns, 0};
