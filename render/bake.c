@@ -63,8 +63,7 @@ static bool prepare(struct baker *baker, const struct material *material, enum s
         return false;
     return mode == SPECTRAL_PRODUCT
                ? band_matrix_product(baker->set, baker->lamp, baker->observer, &baker->matrix, err)
-               : band_matrix_adapted(baker->set, baker->lamp, baker->observer, &baker->matrix,
-                                     err);
+               : band_matrix_adapted(baker->set, baker->lamp, baker->observer, &baker->matrix, err);
 }
 
 static struct xyz perfect(const struct baker *baker)

@@ -72,6 +72,17 @@ static bool complete(struct error *err)
            fail(err, ERROR_SYSTEM, "OpenGL: frame buffer incomplete: 0x%x", status);
 }
 
+// Takes every error that OpenGL has kept; a lost context keeps one for ever.
+static bool no_error(const char *doing, struct error *err)
+{
+    GLenum first = glGetError();
+    if (first == GL_NO_ERROR)
+        return true;
+    for (int i = 0; i < 16 && glGetError() != GL_NO_ERROR; i++)
+        ;
+    return fail(err, ERROR_SYSTEM, "OpenGL: %s: error 0x%x", doing, first);
+}
+
 static void attach(int place, GLuint texture)
 {
     glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0 + place, GL_TEXTURE_2D, texture, 0);
@@ -334,8 +345,8 @@ static bool draw_surface(struct renderer *r, const struct scene *scene, struct e
     if (!scene->texels || !scene->display)
         return fail(err, ERROR_CONFIG, "no %s to show a surface with",
                     scene->texels ? "display model" : "material");
-    bool good = light_stage(r, scene, err) && place_stage(r, scene, err) &&
-                texel_stage(r, scene, err);
+    bool good =
+        light_stage(r, scene, err) && place_stage(r, scene, err) && texel_stage(r, scene, err);
     r->seen_lights = r->seen_places = r->seen_texels = r->seen_display = good;
     if (!good)
         return false;
@@ -367,8 +378,8 @@ static void present(struct renderer *r)
         glBindFramebuffer(GL_READ_FRAMEBUFFER, r->frame_target);
         glReadBuffer(GL_COLOR_ATTACHMENT1);
         glBindFramebuffer(GL_DRAW_FRAMEBUFFER, 0);
-        glBlitFramebuffer(0, 0, r->width, r->height, 0, 0, r->width, r->height,
-                          GL_COLOR_BUFFER_BIT, GL_NEAREST);
+        glBlitFramebuffer(0, 0, r->width, r->height, 0, 0, r->width, r->height, GL_COLOR_BUFFER_BIT,
+                          GL_NEAREST);
     }
     r->context->present(r->context);
     glFinish();
@@ -376,7 +387,8 @@ static void present(struct renderer *r)
 
 static int bits_of(const struct renderer *r, const struct scene *scene)
 {
-    bool deep = scene->bits == 10 && (r->context->window_bits == 0 || r->context->window_bits >= 10);
+    bool deep =
+        scene->bits == 10 && (r->context->window_bits == 0 || r->context->window_bits >= 10);
     return deep ? 10 : 8;
 }
 
@@ -404,10 +416,9 @@ bool renderer_show(struct renderer *r, const struct scene *scene, bool force, bo
         break;
     }
     present(r);
-    GLenum code = glGetError();
-    if (code != GL_NO_ERROR) {
+    if (!no_error("drawing", err)) {
         r->seen_lights = r->seen_places = r->seen_texels = r->seen_display = false;
-        return fail(err, ERROR_SYSTEM, "OpenGL: error 0x%x", code);
+        return false;
     }
     r->last = *scene;
     r->shown = true;
@@ -452,10 +463,8 @@ static void *read_back(struct renderer *r, int place, GLenum format, GLenum type
     glReadBuffer(GL_COLOR_ATTACHMENT0 + place);
     glPixelStorei(GL_PACK_ALIGNMENT, 1);
     glReadPixels(0, 0, r->width, r->height, format, type, pixels);
-    GLenum code = glGetError();
-    if (code != GL_NO_ERROR) {
+    if (!no_error("reading back", err)) {
         free(pixels);
-        fail(err, ERROR_SYSTEM, "OpenGL: reading back: error 0x%x", code);
         return NULL;
     }
     flip_rows(pixels, row_bytes, r->height);

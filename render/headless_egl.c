@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <epoxy/gl.h>
 #include <epoxy/egl.h>
+#include <epoxy/gl.h>
 #include <stdlib.h>
 
 #include "render/context.h"
@@ -60,8 +60,8 @@ static bool start(struct headless *h, struct error *err)
     h->display = eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, NULL);
     if (h->display == EGL_NO_DISPLAY || !eglInitialize(h->display, NULL, NULL))
         return fail(err, ERROR_SYSTEM, "EGL: no display: error 0x%x", (unsigned)eglGetError());
-    if (!eglBindAPI(EGL_OPENGL_API) ||
-        !eglChooseConfig(h->display, wanted, &config, 1, &count) || count < 1)
+    if (!eglBindAPI(EGL_OPENGL_API) || !eglChooseConfig(h->display, wanted, &config, 1, &count) ||
+        count < 1)
         return fail(err, ERROR_SYSTEM, "EGL: no configuration for OpenGL");
     h->context = eglCreateContext(h->display, config, EGL_NO_CONTEXT, version);
     if (h->context == EGL_NO_CONTEXT)

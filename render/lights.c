@@ -47,8 +47,8 @@ static bool map_of(const struct exr *image, const struct ceiling *ceiling,
     int channel = exr_channel(image, "Y");
     if (channel < 0)
         return fail(err, ERROR_DATA, "no channel \"Y\" (cd/m2)");
-    struct luminance_map read = {.ceiling = *ceiling, .width = image->width,
-                                 .height = image->height};
+    struct luminance_map read = {
+        .ceiling = *ceiling, .width = image->width, .height = image->height};
     if (!size_from(image, "boothd.width_m", ceiling->width_m, &read.ceiling.width_m, err) ||
         !size_from(image, "boothd.depth_m", ceiling->depth_m, &read.ceiling.depth_m, err))
         return false;
@@ -198,8 +198,8 @@ double luminance_map_illuminance(const struct luminance_map *map, struct vec3 p,
                 continue;
             to.x = c->centre_m[0] - c->width_m / 2 + (col + 0.5) * step_x - p.x;
             if (vec3_dot(to, to) > far * far)
-                row_sum += diffuse_point(to.x, to.y, to.z, n.x, n.y, n.z, 0, -1, 0,
-                                         luminance[col] * area);
+                row_sum +=
+                    diffuse_point(to.x, to.y, to.z, n.x, n.y, n.z, 0, -1, 0, luminance[col] * area);
             else
                 row_sum += luminance[col] * pixel_illuminance(to, step_x / 2, step_z / 2, n);
         }

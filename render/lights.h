@@ -18,9 +18,9 @@ struct ceiling {
 // (least z), column 0 the left edge (least x).
 struct luminance_map {
     struct ceiling ceiling;
-    int width, height; // 1..16384
-    double *luminance; // owned
-    long negative;     // pixels that were below zero (camera noise) and set to 0
+    int width, height;    // 1..16384
+    double *luminance;    // owned
+    long negative;        // pixels that were below zero (camera noise) and set to 0
     double negative_mean; // their mean, cd/m2: the bias that clipping left
 };
 
@@ -49,9 +49,13 @@ struct light_points {
 
 enum median_cut { CUT_VARIANCE, CUT_ENERGY };
 
-// At most `most` points (1..4096), fewer when the map has fewer lit pixels; an
-// all-dark map gives none. Sums in double on coordinates centred on the image;
-// a dark or single-pixel region is never split; ties keep the lower index.
+// Exactly `most` points (1..4096), or as many as the map has lit pixels when
+// those are fewer; an all-dark map gives none. The region of the greatest
+// energy (CUT_ENERGY) or second moment (CUT_VARIANCE) is split next. Sums in
+// double over each region's own columns and rows, about its own centre: a
+// summed-area table of the image would cancel away the digits of small
+// regions. Dark edges are trimmed, so that no part is ever dark; a single
+// pixel is never split; ties keep the lower index.
 // Sources: Debevec 2005 (equal energy); Viriyothai, Debevec 2009 (variance).
 bool median_cut(const struct luminance_map *map, enum median_cut how, int most,
                 struct light_points *out, struct error *err);

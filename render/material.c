@@ -22,8 +22,7 @@ static bool check_palette(const struct spectrum *palette, int count, struct erro
 
 // A zeroed material with its palette copied and its index allocated.
 static bool with_palette(const char *name, const struct spectrum *palette, char (*names)[64],
-                         int count, int width, int height, struct material *out,
-                         struct error *err)
+                         int count, int width, int height, struct material *out, struct error *err)
 {
     struct material made = {.width = width, .height = height, .palette_count = count};
     snprintf(made.name, sizeof made.name, "%s", name);
@@ -103,8 +102,7 @@ static int band_channels(const struct exr *image, int *channels)
     return count;
 }
 
-static bool band_set_of(const struct exr *image, int count, struct band_set *set,
-                        struct error *err)
+static bool band_set_of(const struct exr *image, int count, struct band_set *set, struct error *err)
 {
     double centre[BANDS_MOST], width[BANDS_MOST];
     int given = 0;
@@ -118,8 +116,10 @@ static bool band_set_of(const struct exr *image, int count, struct band_set *set
     if (given == 0)
         return band_set_shipped(count, set, err);
     if (given != 2 * count)
-        return fail(err, ERROR_DATA, "%d bands, but %d of the attributes boothd.centre_nm<j>, "
-                    "boothd.width_nm<j>: all or none are needed", count, given);
+        return fail(err, ERROR_DATA,
+                    "%d bands, but %d of the attributes boothd.centre_nm<j>, "
+                    "boothd.width_nm<j>: all or none are needed",
+                    count, given);
     return band_set_make(count, centre, width, set, err);
 }
 

@@ -85,8 +85,10 @@ static bool trim(const struct cutter *cutter, struct region *r)
         top++;
     while (!(cutter->rows[bottom - 1].energy > 0))
         bottom--;
-    *r = (struct region){.left = r->left + left, .top = r->top + top,
-                         .right = r->left + right, .bottom = r->top + bottom};
+    *r = (struct region){.left = r->left + left,
+                         .top = r->top + top,
+                         .right = r->left + right,
+                         .bottom = r->top + bottom};
     measure(cutter, r);
     bool single = right - left == 1 && bottom - top == 1;
     double worth = cutter->how == CUT_ENERGY ? r->all.energy : variance(&r->all);
@@ -193,8 +195,12 @@ bool median_cut(const struct luminance_map *map, enum median_cut how, int most,
     struct light_point *points = malloc(most * sizeof *points);
     bool good = lines && regions && points;
     if (good) {
-        struct cutter cutter = {map, how, map->ceiling.width_m / map->width,
-                                map->ceiling.depth_m / map->height, lines, lines + width,
+        struct cutter cutter = {map,
+                                how,
+                                map->ceiling.width_m / map->width,
+                                map->ceiling.depth_m / map->height,
+                                lines,
+                                lines + width,
                                 lines + width + height};
         int count = cut_all(&cutter, regions, most);
         for (int i = 0; i < count; i++)

@@ -13,8 +13,7 @@ struct pixel reference_pixel(const struct scene *scene, int x_px, int y_px)
 {
     struct pixel out = {.inverse.in_gamut = true};
     int column = scene_texel_column(scene, x_px), row = scene_texel_row(scene, y_px);
-    struct vec3 p = rigid_apply(scene->booth_from_screen,
-                                screen_point(&scene->screen, x_px, y_px));
+    struct vec3 p = rigid_apply(scene->booth_from_screen, screen_point(&scene->screen, x_px, y_px));
     struct vec3 n = mat3_apply(scene->booth_from_screen.rotation, (struct vec3){0, 0, 1});
     if (scene->lights)
         out.illuminance = light_points_illuminance(scene->lights, scene->level, p, n);

@@ -34,7 +34,8 @@ const char *renderer_name(const struct renderer *renderer);
 bool renderer_show(struct renderer *renderer, const struct scene *scene, bool force, bool *drawn,
                    struct error *err);
 
-// Window events; false when the user closed the window. Always true on EGL.
+// Handles window events, waiting up to timeout_s for one; false when the user
+// closed the window. True and at once on EGL.
 bool renderer_events(struct renderer *renderer, double timeout_s);
 
 // The last frame: 8-bit counts, [height][width][3], row 0 on top, malloc'd.

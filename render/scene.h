@@ -49,9 +49,9 @@ struct scene {
 
 // What a pixel should be, in double: see reference.h.
 struct pixel {
-    double illuminance;      // lux on the screen plane there
-    struct xyz surface;      // cd/m2 that the surface would send
-    struct xyz emitted;      // surface less the screen's own reflection
+    double illuminance; // lux on the screen plane there
+    struct xyz surface; // cd/m2 that the surface would send
+    struct xyz emitted; // surface less the screen's own reflection
     struct display_inverse inverse;
 };
 

@@ -28,7 +28,7 @@
     } while (0)
 
 #define assert_relative(got, wanted, tolerance)                                                    \
-    assert_float_within(got, wanted, (tolerance) * fabs((double)(wanted)))
+    assert_float_within(got, wanted, (tolerance)*fabs((double)(wanted)))
 
 #define assert_good(call, err)                                                                     \
     do {                                                                                           \

@@ -278,8 +278,8 @@ static void ten_bits_are_four_times_finer(void **state)
     for (int y = 0; y < SURFACE_HEIGHT; y += 7)
         for (int x = 0; x < SURFACE_WIDTH; x += 7) {
             struct pixel p = reference_pixel(&s.scene, x, y);
-            assert_float_within(counts[3 * (y * SURFACE_WIDTH + x) + 1],
-                                255 * p.inverse.counts.g, 0.5 + 0.125 + 2e-3);
+            assert_float_within(counts[3 * (y * SURFACE_WIDTH + x) + 1], 255 * p.inverse.counts.g,
+                                0.5 + 0.125 + 2e-3);
         }
     free(counts);
     s.scene.bits = 8;

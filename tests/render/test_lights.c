@@ -317,8 +317,8 @@ static void no_surface_anywhere_gets_more_than_pi_times_the_luminance(void **sta
         for (double tilt = -90; tilt <= 180; tilt += 15)
             for (double x = -0.5; x <= 0.5; x += 0.25) {
                 struct vec3 p = {x, 0.75 - gap, 0.05};
-                struct vec3 n = mat3_apply(mat3_rotation(0, tilt * M_PI / 180),
-                                           (struct vec3){0, 1, 0});
+                struct vec3 n =
+                    mat3_apply(mat3_rotation(0, tilt * M_PI / 180), (struct vec3){0, 1, 0});
                 double e = luminance_map_illuminance(&map, p, n);
                 assert_true(e >= 0 && e <= 3000 * M_PI * (1 + 1e-9));
                 most = fmax(most, e);

@@ -106,8 +106,8 @@ static void assert_screen_is(struct renderer *renderer)
 
 static struct renderer *open_window(struct error *err)
 {
-    struct renderer_options options = {.window = true, .width = SCREEN_WIDTH,
-                                       .height = SCREEN_HEIGHT};
+    struct renderer_options options = {
+        .window = true, .width = SCREEN_WIDTH, .height = SCREEN_HEIGHT};
     return renderer_create(&options, err);
 }
 
@@ -127,8 +127,8 @@ static void the_screen_shows_exactly_the_counts_when_show_returns(void **state)
         surface_tilt(&s, 10 + 4 * i);
         assert_good(renderer_show(renderer, &s.scene, false, NULL, &err), err);
         assert_screen_is(renderer);
-        struct scene patch = {.kind = SCENE_PATCH, .patch = {i / 20.0, 0.5, 1 - i / 20.0},
-                              .bits = 8};
+        struct scene patch = {
+            .kind = SCENE_PATCH, .patch = {i / 20.0, 0.5, 1 - i / 20.0}, .bits = 8};
         assert_good(renderer_show(renderer, &patch, false, NULL, &err), err);
         assert_screen_is(renderer);
         assert_true(renderer_events(renderer, 0));
@@ -182,8 +182,10 @@ static void a_monitor_that_is_not_there_is_named_in_the_refusal(void **state)
 {
     (void)state;
     struct error err = {0};
-    struct renderer_options options = {.window = true, .fullscreen = true,
-                                       .monitor = "PROOF-1", .width = SCREEN_WIDTH,
+    struct renderer_options options = {.window = true,
+                                       .fullscreen = true,
+                                       .monitor = "PROOF-1",
+                                       .width = SCREEN_WIDTH,
                                        .height = SCREEN_HEIGHT};
     assert_null(renderer_create(&options, &err));
     assert_int_equal(err.code, ERROR_CONFIG);
@@ -194,8 +196,8 @@ static void full_screen_on_the_first_monitor_shows_the_same(void **state)
 {
     (void)state;
     struct error err = {0};
-    struct renderer_options options = {.window = true, .fullscreen = true, .width = SCREEN_WIDTH,
-                                       .height = SCREEN_HEIGHT};
+    struct renderer_options options = {
+        .window = true, .fullscreen = true, .width = SCREEN_WIDTH, .height = SCREEN_HEIGHT};
     struct renderer *renderer = renderer_create(&options, &err);
     assert_good(renderer, err);
     print_message("%s\n", renderer_name(renderer));
@@ -210,8 +212,8 @@ static void a_window_of_another_size_than_the_monitor_is_refused(void **state)
 {
     (void)state;
     struct error err = {0};
-    struct renderer_options options = {.window = true, .fullscreen = true, .width = 1280,
-                                       .height = 800};
+    struct renderer_options options = {
+        .window = true, .fullscreen = true, .width = 1280, .height = 800};
     assert_null(renderer_create(&options, &err));
     print_message("%s\n", err.text);
     assert_int_equal(err.code, ERROR_CONFIG);
