@@ -12,9 +12,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <cmocka.h>
-
 #include "simulator/scenario.h"
+
+#include <cmocka.h> // last: its fail() is a macro
+
 #include "tests/fakes/near.h"
 
 #define SHIPPED "simulator/scenarios/booth.ini"
