@@ -152,7 +152,7 @@ static void start_measuring(struct pr655 *d, int code, int64_t now_ns)
     memset(d->sum, 0, sizeof(d->sum));
     d->sample_ns = now_ns;
     d->light_end_ns = now_ns + (int64_t)(light_ms * 1e6);
-    d->end_ns = d->light_end_ns + (int64_t)((OVERHEAD_MS + light_ms) * 1e6 / d->options.hurry);
+    d->end_ns = d->light_end_ns + (int64_t)((OVERHEAD_MS / d->options.hurry + light_ms) * 1e6);
     d->step_ns = (d->light_end_ns - now_ns) / SAMPLES + 1;
 }
 
