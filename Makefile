@@ -42,6 +42,9 @@ config_libs      := -lm
 calibration_libs := -lceres -lglog -lmatio -lstdc++ -lm
 daemon_libs      := -lsystemd -lpthread -lm
 
+# One short line a step; V=1 shows the whole commands.
+say = $(if $(V),,@echo '$(1)';)
+
 below = $(shell sed -n 's/^$(1): *//p' tests/layers.txt)
 archives = $(foreach f,$(1),$(BUILD)/$(f).a)
 libs = -Wl,--start-group $(call archives,$(1)) -Wl,--end-group -Wl,--as-needed $(foreach f,$(1),$($(f)_libs)) -fopenmp $(SANITIZE)
@@ -69,11 +72,11 @@ $(BUILD)/packages.ok: Makefile
 
 $(BUILD)/%.o: %.c | $(BUILD)/packages.ok
 	@mkdir -p $(@D)
-	$(CC) $(ALL_C) -MMD -MP -c $< -o $@
+	$(call say,CC $<)$(CC) $(ALL_C) -MMD -MP -c $< -o $@
 
 $(BUILD)/%.o: %.cpp | $(BUILD)/packages.ok
 	@mkdir -p $(@D)
-	$(CXX) $(ALL_CXX) -MMD -MP -c $< -o $@
+	$(call say,C++ $<)$(CXX) $(ALL_CXX) -MMD -MP -c $< -o $@
 
 # Shaders are files; this one rule embeds them as C strings.
 $(BUILD)/render/shaders_embedded.inc: $(SHADERS)
@@ -90,23 +93,23 @@ FORCE:
 define folder_rule
 $(BUILD)/$(1).a: $(call object,$(filter $(1)/%,$(SOURCES)))
 	@rm -f $$@
-	$(AR) rcs $$@ $$^
+	@$(AR) rcs $$@ $$^
 $(BUILD)/tests/$(1)/%: $(BUILD)/tests/$(1)/%.o $(call object,$(FAKES)) $(call archives,$(1) $(call below,$(1)))
-	$(CC) -o $$@ $$< $(call object,$(FAKES)) $(call libs,$(1) $(call below,$(1))) $($(1)_test_libs) -lcmocka
+	$$(call say,LD $$@)$(CC) -o $$@ $$< $(call object,$(FAKES)) $(call libs,$(1) $(call below,$(1))) $($(1)_test_libs) -lcmocka
 $(BUILD)/links/$(1): $(BUILD)/$(1).a $(call archives,$(call below,$(1)))
 	@mkdir -p $$(@D)
-	$(CC) -shared -Wl,--no-undefined -o $$@ -Wl,--whole-archive $$< -Wl,--no-whole-archive $(call libs,$(1) $(call below,$(1)))
+	$$(call say,LINKS $(1))$(CC) -shared -Wl,--no-undefined -o $$@ -Wl,--whole-archive $$< -Wl,--no-whole-archive $(call libs,$(1) $(call below,$(1)))
 endef
 $(foreach f,$(FOLDERS),$(eval $(call folder_rule,$(f))))
 
 define program_rule
 $(BUILD)/$(1): $(BUILD)/$($(1)_in)/$(1).o $(call archives,$($(1)_in) $(call below,$($(1)_in)))
-	$(CC) -o $$@ $$< $(call libs,$($(1)_in) $(call below,$($(1)_in)))
+	$$(call say,LD $$@)$(CC) -o $$@ $$< $(call libs,$($(1)_in) $(call below,$($(1)_in)))
 endef
 $(foreach p,$(PROGRAMS),$(eval $(call program_rule,$(p))))
 
 $(BUILD)/tests/whole/%: $(BUILD)/tests/whole/%.o $(call object,$(FAKES)) $(call archives,base files colorimetry) $(PROGRAMS:%=$(BUILD)/%)
-	$(CC) -o $@ $< $(call object,$(FAKES)) $(call libs,base files colorimetry) -lcmocka
+	$(call say,LD $@)$(CC) -o $@ $< $(call object,$(FAKES)) $(call libs,base files colorimetry) -lcmocka
 
 $(call object,render/program.c): $(BUILD)/render/shaders_embedded.inc
 
