@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+// One thread per instrument: opens it, reads it, waits longer and longer while
+// it is not there, and keeps its newest sample in a mailbox.
+#ifndef DAEMON_ACQUIRE_H
+#define DAEMON_ACQUIRE_H
+
+#include "base/mailbox.h"
+#include "config/booth.h"
+#include "daemon/state.h"
+
+#define INSTRUMENTS(X)                                                                             \
+    X(SPECTROMETER, "spectrometer")                                                                \
+    X(ACCELEROMETER, "accelerometer")                                                              \
+    X(TRACKER, "tracker")                                                                          \
+    X(RADIOMETER, "radiometer") /* on demand, see measure.h */
+
+enum instrument {
+#define X(name, text) INSTRUMENT_##name,
+    INSTRUMENTS(X)
+#undef X
+        INSTRUMENT_COUNT
+};
+
+const char *instrument_name(enum instrument instrument);
+
+#define INSTRUMENT_STATES(X)                                                                       \
+    X(NONE, "none")       /* the settings name none */                                             \
+    X(WAITING, "waiting") /* not there; tried again and again */                                   \
+    X(SILENT, "silent")   /* open, but without a sample */                                         \
+    X(RUNNING, "running")                                                                          \
+    X(IDLE, "idle") /* on demand, nothing asked */
+
+enum instrument_state {
+#define X(name, text) INSTRUMENT_IS_##name,
+    INSTRUMENT_STATES(X)
+#undef X
+};
+
+const char *instrument_state_name(enum instrument_state state);
+
+// What a person wants to know of an instrument.
+struct instrument_report {
+    enum instrument_state state;
+    char driver[32];
+    struct instrument_identity identity; // of the last time it was open
+    uint64_t samples;                    // since the start
+    int64_t latest_ns;                   // of the last sample; valid when samples > 0
+    char note[32];                       // of the last sample: "good", "seen", …
+    struct error error;                  // the last one; code NONE while all is well
+};
+
+// Drivers and their options; a driver of NULL is none.
+struct acquire_from {
+    const struct spectrometer_driver *spectrometer;
+    struct spectrometer_options spectrometer_options;
+    const struct accelerometer_driver *accelerometer;
+    struct accelerometer_options accelerometer_options;
+    const struct tracker_driver *tracker;
+    struct tracker_options tracker_options;
+};
+
+struct acquire_from acquire_from(const struct booth_settings *settings);
+
+struct acquire;
+
+// Starts the threads. They log one line per change of an instrument's state.
+// NULL with err (SYSTEM).
+struct acquire *acquire_start(const struct acquire_from *from, struct error *err);
+
+// Asks all threads to end and waits for them until deadline_ns; false when one
+// is still inside its driver: then nothing was freed and the program must end.
+// Accepts NULL.
+bool acquire_stop(struct acquire *acquire, int64_t deadline_ns);
+
+// Newest samples and their running numbers. Any thread.
+void acquire_latest(struct acquire *acquire, struct samples *out);
+
+// Any thread.
+void acquire_report(struct acquire *acquire, enum instrument instrument,
+                    struct instrument_report *out);
+
+#endif

@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "daemon/setup.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "config/display_file.h"
+#include "config/paths.h"
+
+static const double CONDITION_WARNING = 10;
+
+static bool load_display(struct setup *s, struct error *err)
+{
+    s->display_generation = ++s->generations;
+    if (!path_exists(s->settings.display.model))
+        return true;
+    s->has_display = display_load(s->settings.display.model, &s->display, NULL, err);
+    return s->has_display;
+}
+
+static bool load_lamps(struct setup *s, struct error *err)
+{
+    const struct booth_settings *b = &s->settings;
+    if (!path_exists(b->lamps.folder))
+        return true;
+    if (!lamps_load(b->lamps.folder, &s->lamps, err))
+        return false;
+    s->lights = calloc(s->lamps.count + 1, sizeof *s->lights);
+    if (!s->lights)
+        return fail(err, ERROR_SYSTEM, "no memory for light points");
+    for (int i = 0; i < s->lamps.count; i++)
+        if (*s->lamps.lamps[i].file.map &&
+            !lamp_lights(&s->lamps.lamps[i], &b->ceiling, b->quality.cut, b->quality.lights,
+                         &s->lights[i], err))
+            return false;
+    s->lights_generation = s->generations + 1;
+    s->generations += s->lamps.count;
+    return true;
+}
+
+void setup_free(struct setup *s)
+{
+    if (!s)
+        return;
+    for (int i = 0; s->lights && i < s->lamps.count; i++)
+        light_points_fini(&s->lights[i]);
+    free(s->lights);
+    lamps_fini(&s->lamps);
+    material_fini(&s->material);
+    free(s->texels);
+    free(s);
+}
+
+static bool show_again(struct setup *s, const struct setup *old, struct error *err)
+{
+    if (old && old->show == SHOW_MATERIAL)
+        return setup_show(s, old->material_name, old->patch_name, err);
+    if (old && old->show == SHOW_PATCH)
+        setup_patch(s, old->counts);
+    if (!old && *s->settings.materials.show)
+        return setup_show(s, s->settings.materials.show, "", err);
+    return true;
+}
+
+bool setup_reload(const struct setup_source *source, const struct setup *old, struct setup **out,
+                  struct error *err)
+{
+    struct setup *s = calloc(1, sizeof *s);
+    if (!s)
+        return fail(err, ERROR_SYSTEM, "no memory for the setup");
+    s->baked_lamp = -1;
+    s->generations = old ? old->generations : 0;
+    if (booth_load(source->path, source->overrides, source->override_count, &s->settings, err) &&
+        load_display(s, err) && load_lamps(s, err) && show_again(s, old, err)) {
+        *out = s;
+        return true;
+    }
+    setup_free(s);
+    return false;
+}
+
+bool setup_load(const struct setup_source *source, struct setup **out, struct error *err)
+{
+    return setup_reload(source, NULL, out, err);
+}
+
+static void forget_bake(struct setup *s)
+{
+    free(s->texels);
+    s->texels = NULL;
+    s->baked_lamp = -1;
+}
+
+bool setup_show(struct setup *s, const char *name, const char *patch, struct error *err)
+{
+    struct material whole = {0}, one = {0};
+    if (!material_load(&s->settings, name, &whole, err))
+        return false;
+    bool fine = !*patch || material_patch(&whole, patch, &one, err);
+    if (fine) {
+        material_fini(&s->material);
+        s->material = *patch ? one : whole;
+        snprintf(s->material_name, sizeof s->material_name, "%s", name);
+        snprintf(s->patch_name, sizeof s->patch_name, "%s", patch);
+        s->show = SHOW_MATERIAL;
+        forget_bake(s);
+    }
+    if (!fine || *patch)
+        material_fini(&whole);
+    return fine;
+}
+
+void setup_patch(struct setup *s, struct counts counts)
+{
+    s->show = SHOW_PATCH;
+    s->counts = counts;
+}
+
+static bool bake(struct setup *s, int lamp, struct error *err)
+{
+    if (s->texels && s->baked_lamp == lamp)
+        return true;
+    struct xyz white;
+    float *texels = material_bake(&s->material, &s->lamps.lamps[lamp].irradiance,
+                                  s->settings.quality.observer, s->settings.quality.spectral,
+                                  s->settings.quality.bands, &white, err);
+    if (!texels)
+        return while_doing(err, "showing %s under %s", s->material_name,
+                           s->lamps.lamps[lamp].file.name);
+    forget_bake(s);
+    s->texels = texels;
+    s->white = white;
+    s->baked_lamp = lamp;
+    s->texels_generation = ++s->generations;
+    return true;
+}
+
+static void lay_material(const struct setup *s, struct scene *out)
+{
+    const struct material *m = &s->material;
+    out->texels = s->texels;
+    out->texels_width = m->width;
+    out->texels_height = m->height;
+    out->texels_generation = s->texels_generation;
+    out->texel_offset = (struct vec3){0.5, 0.5, 0};
+    out->texel_scale_x = m->width_m > 0 ? m->width_m : s->settings.screen.width_m;
+    out->texel_scale_y = m->height_m > 0 ? m->height_m : s->settings.screen.height_m;
+    out->white = s->white;
+}
+
+static bool can_proof(const struct setup *s, const struct state *state)
+{
+    int lamp = state->lamp.index;
+    return s->show == SHOW_MATERIAL && s->has_display && lamp >= 0 && lamp < s->lamps.count &&
+           s->lights[lamp].count > 0;
+}
+
+bool setup_scene(struct setup *s, const struct state *state, struct scene *out, struct error *err)
+{
+    const struct booth_settings *b = &s->settings;
+    *out = (struct scene){
+        .kind = s->show == SHOW_PATCH ? SCENE_PATCH : SCENE_DARK,
+        .patch = s->counts,
+        .screen = b->screen,
+        .booth_from_screen = stand_pose(&b->stand.stand, state->tilt.deg),
+        .eye = state->eye.at,
+        .screen_reflectance = b->display.reflectance,
+        .display = s->has_display ? &s->display : NULL,
+        .display_generation = s->display_generation,
+        .bits = booth_bits(b),
+        .dither = b->display.dither,
+    };
+    if (!can_proof(s, state))
+        return true;
+    if (!bake(s, state->lamp.index, err))
+        return false;
+    out->kind = SCENE_SURFACE;
+    out->lights = &s->lights[state->lamp.index];
+    out->lights_generation = s->lights_generation + state->lamp.index;
+    out->level = state->lamp.level;
+    lay_material(s, out);
+    return true;
+}
+
+static bool lamp_without_map(const struct setup *s, int index, char *text, size_t size)
+{
+    for (int i = 0; i < s->lamps.count; i++)
+        if (!*s->lamps.lamps[i].file.map && index-- == 0) {
+            snprintf(text, size, "lamp %s has no luminance map: nothing can be shown under it",
+                     s->lamps.lamps[i].file.name);
+            return true;
+        }
+    return false;
+}
+
+bool setup_warning(const struct setup *s, int index, char *text, size_t size)
+{
+    const struct booth_settings *b = &s->settings;
+    if (!s->has_display && index-- == 0) {
+        if (*b->display.model)
+            snprintf(text, size, "the display model %s is not there yet", b->display.model);
+        else
+            snprintf(text, size, "the settings name no display model");
+        return true;
+    }
+    if (s->has_display && s->display.condition > CONDITION_WARNING && index-- == 0) {
+        snprintf(text, size, "the display's primaries are close together: condition %.1f is above %g",
+                 s->display.condition, CONDITION_WARNING);
+        return true;
+    }
+    if (!s->lamps.count && index-- == 0) {
+        snprintf(text, size, "no lamp was taught yet in %s", b->lamps.folder);
+        return true;
+    }
+    return lamp_without_map(s, index, text, size);
+}
