@@ -120,7 +120,7 @@ static const struct setting state_rows[] = {
      "Time constant over which a resting tilt is smoothed."},
     {"dark_lux", SETTING_DOUBLE, AT(state.dark_lux), 0, 0, 1000, "lx", NULL, "5",
      "Illuminance below which no lamp is on."},
-    {"lamp_distance", SETTING_DOUBLE, AT(state.lamp_distance), 0, 0, 2, "", NULL, "0.1",
+    {"lamp_distance", SETTING_DOUBLE, AT(state.lamp_distance), 0, 0.001, 1, "", NULL, "0.01",
      "Greatest difference of spectral shape at which a lamp is still recognised."},
     {"confirmations", SETTING_INT, AT(state.confirmations), 0, 1, 20, "", NULL, "2",
      "Readings in a row that must agree before another lamp is believed."},

@@ -27,7 +27,7 @@ struct state_settings {
     double level_s;       // 0..60: time constant of the lamp's level
     double tilt_s;        // 0..10: time constant of the tilt
     double dark_lux;      // 0..1000: below it no lamp is on
-    double lamp_distance; // 0..2: greatest shape distance of a known lamp
+    double lamp_distance; // 0.001..1: greatest shape distance of a known lamp
     int confirmations;    // 1..20: equal readings before another lamp is believed
 };
 
