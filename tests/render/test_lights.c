@@ -160,6 +160,67 @@ static void a_faint_corner_beside_a_bright_spot_keeps_its_digits(void **state)
     luminance_map_fini(&map);
 }
 
+static void of_two_equal_cuts_the_lower_index_is_taken(void **state)
+{
+    (void)state;
+    for (int how = CUT_VARIANCE; how <= CUT_ENERGY; how++) {
+        struct luminance_map map = map_from(booth_ceiling(), 3, 1, uniform_light);
+        struct light_points lights = cut(&map, how, 2);
+        assert_relative(lights.points[0].intensity_cd, 3000 * 0.54 / 3, ENERGY);
+        assert_true(lights.points[0].at.x < lights.points[1].at.x);
+        light_points_fini(&lights);
+        luminance_map_fini(&map);
+    }
+}
+
+// Second moment of columns left..right-1 and rows top..bottom-1 about their
+// centroid, in two passes.
+static double moment_of(const struct luminance_map *map, int left, int top, int right, int bottom)
+{
+    double step_x = map->ceiling.width_m / map->width, step_z = map->ceiling.depth_m / map->height;
+    double energy = 0, x = 0, z = 0, sum = 0;
+    for (int i = top; i < bottom; i++)
+        for (int j = left; j < right; j++) {
+            energy += map->luminance[i * map->width + j];
+            x += map->luminance[i * map->width + j] * j * step_x;
+            z += map->luminance[i * map->width + j] * i * step_z;
+        }
+    for (int i = top; i < bottom; i++)
+        for (int j = left; j < right; j++)
+            sum += map->luminance[i * map->width + j] *
+                   (pow(j * step_x - x / energy, 2) + pow(i * step_z - z / energy, 2));
+    return sum;
+}
+
+static void variance_cut_makes_the_larger_of_both_moments_least(void **state)
+{
+    (void)state;
+    uint32_t random = 1;
+    for (int trial = 0; trial < 200; trial++) {
+        struct luminance_map map = map_from(booth_ceiling(), 7, 5, uniform_light);
+        for (int i = 0; i < 35; i++) {
+            random = random * 1664525u + 1013904223u;
+            map.luminance[i] = 1 + pow(random >> 16, 1.5);
+        }
+        double best = INFINITY, first = 0;
+        for (int at = 1; at < 7 + 5 - 1; at++) {
+            int right = at < 7 ? at : 7, bottom = at < 7 ? 5 : at - 6;
+            double a = moment_of(&map, 0, 0, right, bottom);
+            double b = moment_of(&map, at < 7 ? right : 0, at < 7 ? 0 : bottom, 7, 5);
+            if (fmax(a, b) >= best)
+                continue;
+            best = fmax(a, b);
+            first = 0;
+            for (int i = 0; i < 35; i++)
+                first += i % 7 < right && i / 7 < bottom ? map.luminance[i] * 0.54 / 35 : 0;
+        }
+        struct light_points lights = cut(&map, CUT_VARIANCE, 2);
+        assert_relative(lights.points[0].intensity_cd, first, ENERGY);
+        light_points_fini(&lights);
+        luminance_map_fini(&map);
+    }
+}
+
 static void a_count_outside_1_to_4096_is_refused(void **state)
 {
     (void)state;
@@ -307,6 +368,26 @@ static void dense_integration_agrees_with_the_published_factor_of_a_rectangle(vo
     luminance_map_fini(&many);
 }
 
+static void splitting_a_rectangle_changes_nothing_even_where_the_horizon_cuts_it(void **state)
+{
+    (void)state;
+    struct luminance_map one = map_from(booth_ceiling(), 1, 1, uniform_light);
+    struct luminance_map six = map_from(booth_ceiling(), 3, 2, uniform_light);
+    struct luminance_map many = map_from(booth_ceiling(), 300, 200, uniform_light);
+    struct vec3 p = {0.1, 0.45, 0.1};
+    for (double turn = 0; turn < 2 * M_PI; turn += 0.37)
+        for (double tilt = 0.3; tilt < 2.3; tilt += 0.25) {
+            struct vec3 n = {sin(tilt) * cos(turn), cos(tilt), sin(tilt) * sin(turn)};
+            double e = luminance_map_illuminance(&one, p, n);
+            assert_float_within(luminance_map_illuminance(&six, p, n), e, 1e-12 * 3000 * M_PI);
+            // Points of 3 mm lie before or behind the horizon as a whole.
+            assert_float_within(luminance_map_illuminance(&many, p, n), e, 1e-4 * 3000 * M_PI);
+        }
+    luminance_map_fini(&one);
+    luminance_map_fini(&six);
+    luminance_map_fini(&many);
+}
+
 static void no_surface_anywhere_gets_more_than_pi_times_the_luminance(void **state)
 {
     (void)state;
@@ -402,6 +483,8 @@ int main(void)
         cmocka_unit_test(one_lit_pixel_gives_one_light_in_its_middle),
         cmocka_unit_test(a_uniform_map_is_cut_into_equal_parts),
         cmocka_unit_test(a_faint_corner_beside_a_bright_spot_keeps_its_digits),
+        cmocka_unit_test(of_two_equal_cuts_the_lower_index_is_taken),
+        cmocka_unit_test(variance_cut_makes_the_larger_of_both_moments_least),
         cmocka_unit_test(a_count_outside_1_to_4096_is_refused),
         cmocka_unit_test(the_error_of_n_points_falls_like_one_over_n),
         cmocka_unit_test(thirty_two_points_stay_below_the_engineering_rule),
@@ -409,6 +492,7 @@ int main(void)
         cmocka_unit_test(a_single_point_follows_the_cosine_and_inverse_square_laws),
         cmocka_unit_test(a_light_behind_beside_or_upon_the_surface_gives_nothing),
         cmocka_unit_test(dense_integration_agrees_with_the_published_factor_of_a_rectangle),
+        cmocka_unit_test(splitting_a_rectangle_changes_nothing_even_where_the_horizon_cuts_it),
         cmocka_unit_test(no_surface_anywhere_gets_more_than_pi_times_the_luminance),
         cmocka_unit_test(through_and_above_the_ceiling_it_is_dark),
         cmocka_unit_test(light_adds_up_when_the_map_is_split_and_scales_with_it),
