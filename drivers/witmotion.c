@@ -184,7 +184,7 @@ static bool connect_bus(struct accelerometer *a, int64_t deadline_ns, struct err
     bool tcp = is_tcp(o->port);
     a->modbus = tcp ? new_tcp(o->port, err) : modbus_new_rtu(o->port, o->baud, 'N', 8, 1);
     if (!a->modbus)
-        return tcp || fail(err, ERROR_CONFIG, "port: \"%s\" is not a serial line", o->port);
+        return !tcp && fail(err, ERROR_CONFIG, "port: \"%s\" is not a serial line", o->port);
     modbus_set_slave(a->modbus, o->unit);
     modbus_set_error_recovery(a->modbus, MODBUS_ERROR_RECOVERY_NONE);
     if (!set_timeouts(a, deadline_ns, err))
