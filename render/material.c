@@ -47,6 +47,16 @@ static int patch_along(int texel, int patch, int gap)
     return within < gap ? -1 : texel / (patch + gap);
 }
 
+static int gap_of(double gap, int patch)
+{
+    return (int)lround(gap * patch);
+}
+
+static int side_of(int patches, int patch, int gap)
+{
+    return patches * (patch + gap) + gap;
+}
+
 bool material_chart(const char *name, const struct spectrum *palette, char (*names)[64], int count,
                     int columns, int rows, double gap, int background, struct material *out,
                     struct error *err)
@@ -59,12 +69,11 @@ bool material_chart(const char *name, const struct spectrum *palette, char (*nam
     if (!(gap >= 0 && gap <= 0.5) || background < 0 || background >= count)
         return fail(err, ERROR_RANGE, "%s: gap %g or background %d is outside 0..0.5, 0..%d", name,
                     gap, background, count - 1);
-    int longest = columns > rows ? columns : rows;
-    int patch = (int)(SIDE_MOST / (longest * (1 + gap) + gap + 1));
-    if (patch > PATCH_TEXELS)
-        patch = PATCH_TEXELS;
-    int between = (int)lround(gap * patch);
-    int width = columns * (patch + between) + between, height = rows * (patch + between) + between;
+    int longest = columns > rows ? columns : rows, patch = PATCH_TEXELS;
+    while (side_of(longest, patch, gap_of(gap, patch)) > SIDE_MOST)
+        patch--;
+    int between = gap_of(gap, patch);
+    int width = side_of(columns, patch, between), height = side_of(rows, patch, between);
     if (!with_palette(name, palette, names, count, width, height, out, err))
         return false;
     for (int y = 0; y < height; y++) {
