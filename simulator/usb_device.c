@@ -356,6 +356,7 @@ static int answer(struct usb_device *d, UMockdevIoctlClient *client)
     case USBDEVFS_RESET:
         return 0;
     case USBDEVFS_GETDRIVER:
+    case USBDEVFS_IOCTL: // asks to detach a kernel driver: there is none
         return -ENODATA;
     default:
         return -ENOTTY;
