@@ -101,8 +101,12 @@ static bool parse_options(int argc, char **argv, struct options *o, int *status)
             o->run = optarg;
             break;
         case LAMP:
-            if (o->lamp_count < LAMP_OPTIONS_MOST)
-                o->lamps[o->lamp_count++] = optarg;
+            if (o->lamp_count == LAMP_OPTIONS_MOST) {
+                fprintf(stderr, "boothsim: more than %d times --lamp\n", LAMP_OPTIONS_MOST);
+                *status = EXIT_USAGE;
+                return false;
+            }
+            o->lamps[o->lamp_count++] = optarg;
             break;
         case SCRIPT:
             o->script = optarg;
@@ -295,7 +299,6 @@ static void take_down(struct booth *b)
     child_end(&b->command, clock_now_ns() + stop_patience_ns);
     control_unlisten(b->server);
     wire_stop(b->wire);
-    world_set_pixels(b->world, NULL, NULL);
     xvfb_screen_close(&b->screen);
     child_end(&b->xvfb, clock_now_ns() + stop_patience_ns);
     world_destroy(b->world);
@@ -315,6 +318,8 @@ static int run(const struct options *options)
         status = EXIT_FAILURE;
         catch_signals();
         good = bring_up(b, &err) && live(b, &status, &err);
+        if (!good && err.code == ERROR_CONFIG)
+            status = EXIT_USAGE;
     }
     if (!good)
         log_line(LOG_LEVEL_ERROR, "%s", err.text);
