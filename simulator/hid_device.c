@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/ioctl.h>
+#include <unistd.h>
 
 #include "base/clock.h"
 #include "simulator/wire_fault.h"
@@ -278,6 +279,18 @@ static void remove_from_sysfs(struct hid_device_emulated *d, const char *path)
     umockdev_testbed_remove_device(d->testbed, sys);
 }
 
+// umockdev 0.17 leaves this link behind, and the next terminal may get the
+// same number.
+static void remove_number_link(struct hid_device_emulated *d)
+{
+    char link[256];
+    char *root = umockdev_testbed_get_root_dir(d->testbed);
+    snprintf(link, sizeof(link), "%s/sys/dev/char/%d:%d", root, d->node.major_number,
+             d->node.minor_number);
+    g_free(root);
+    unlink(link);
+}
+
 static bool show(struct hid_device_emulated *d, struct error *err)
 {
     GError *problem = NULL;
@@ -335,6 +348,7 @@ void hid_unplug(struct hid_device_emulated *device)
     waiter_unlock(&d->waiter);
     remove_from_sysfs(d, d->hidraw_path);
     remove_from_sysfs(d, d->hid_path);
+    remove_number_link(d);
     umockdev_testbed_detach_ioctl(d->testbed, d->devnode, NULL);
     waiter_lock(&d->waiter);
     node_close(&d->node);

@@ -23,19 +23,26 @@ struct inclinometer {
     int64_t answer_ns;
 };
 
+static bool make_server(struct inclinometer *i, int fd)
+{
+    i->server = modbus_new_rtu("/dev/null", WITMOTION_BAUD, 'N', 8, 1);
+    if (!i->server)
+        return false;
+    modbus_set_slave(i->server, WITMOTION_ADDRESS);
+    modbus_set_socket(i->server, fd);
+    return true;
+}
+
 struct inclinometer *inclinometer_create(const struct wire_options *options, struct error *err)
 {
     struct inclinometer *i = calloc(1, sizeof(*i));
     if (i) {
         i->options = *options;
         noise_init(&i->noise, options->seed, 'm');
-        i->server = modbus_new_rtu("/dev/null", WITMOTION_BAUD, 'N', 8, 1);
         i->registers = modbus_mapping_new(0, 0, WITMOTION_REGISTERS, 0);
     }
-    if (i && i->server && i->registers) {
-        modbus_set_slave(i->server, WITMOTION_ADDRESS);
+    if (i && i->registers)
         return i;
-    }
     fail(err, ERROR_SYSTEM, "out of memory");
     inclinometer_destroy(i);
     return NULL;
@@ -57,7 +64,8 @@ static void plugged(void *context, int fd)
     struct inclinometer *i = context;
     witmotion_init(&i->model, &i->options.around, i->options.serial[WIRE_INCLINOMETER],
                    i->options.seed, clock_now_ns());
-    modbus_set_socket(i->server, fd);
+    if (i->server)
+        modbus_set_socket(i->server, fd);
     i->query_size = 0;
 }
 
@@ -85,13 +93,21 @@ static int64_t on_the_line_ns(const struct inclinometer *i)
     return (int64_t)bytes * BITS_PER_BYTE * NS_PER_S / WITMOTION_BAUD;
 }
 
-static void receive(struct inclinometer *i)
+// After a request to somebody else libmodbus would take the next one for that
+// device's answer, so it gets a fresh start.
+static void receive(struct inclinometer *i, int fd)
 {
-    i->query_size = modbus_receive(i->server, i->query);
-    if (i->query_size < 0)
+    if (!i->server && !make_server(i, fd))
+        return;
+    int size = modbus_receive(i->server, i->query);
+    if (size < 0)
         modbus_flush(i->server);
-    if (i->query_size < FRAME_LEAST)
-        i->query_size = 0;
+    if (size < FRAME_LEAST) {
+        modbus_free(i->server);
+        i->server = NULL;
+        return;
+    }
+    i->query_size = size;
     i->answer_ns = clock_now_ns() + on_the_line_ns(i);
 }
 
@@ -124,7 +140,7 @@ static int64_t serve(void *context, int fd, bool readable, enum wire_fault fault
 {
     struct inclinometer *i = context;
     if (i->query_size == 0 && readable)
-        receive(i);
+        receive(i, fd);
     if (i->query_size == 0)
         return INT64_MAX;
     if (clock_now_ns() < i->answer_ns)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The four instruments through unmodified libusb, hidapi and libmodbus, called
 // as any other program would. Runs itself again under umockdev-wrapper.
+#include <errno.h>
 #include <fcntl.h>
 #include <hidapi/hidapi.h>
 #include <libusb.h>
@@ -14,6 +15,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/wait.h>
 #include <termios.h>
 #include <unistd.h>
 
@@ -143,40 +145,538 @@ static void the_spectrometer_tells_its_serial_and_a_spectrum(void **state)
     libusb_exit(usb);
 }
 
-static void the_camera_answers_through_hidapi(void **state)
+static void set_fault(enum wire_instrument instrument, enum wire_fault fault)
+{
+    wire_set_fault(wire, instrument, fault);
+}
+
+struct opened {
+    libusb_context *usb;
+    libusb_device_handle *handle;
+    unsigned char bytes[4608];
+    int size;
+};
+
+static struct opened open_usb(void)
+{
+    struct opened o = {0};
+    assert_int_equal(libusb_init(&o.usb), 0);
+    o.handle = open_spectrometer(o.usb);
+    assert_non_null(o.handle);
+    assert_int_equal(command(o.handle, "\x02\xE8\x03\x00\x00", 5), 0); // 1 ms
+    return o;
+}
+
+static void close_usb(struct opened *o)
+{
+    libusb_close(o->handle);
+    libusb_exit(o->usb);
+}
+
+static void expect_good_spectrum(struct opened *o)
+{
+    assert_int_equal(spectrum(o->handle, o->bytes, &o->size, REPLY_MS), 0);
+    assert_int_equal(o->size, SPECTRUM_SIZE);
+    assert_int_equal(o->bytes[SPECTRUM_SIZE - 1], 0x69);
+}
+
+static void an_unknown_command_is_a_pipe_error(void **state)
 {
     (void)state;
-    unsigned char bytes[64];
-    assert_int_equal(hid_init(), 0);
-    hid_device *camera = hid_open(NINTENDO, REMOTE, NULL);
+    struct opened o = open_usb();
+    assert_int_equal(command(o.handle, "\x55", 1), LIBUSB_ERROR_PIPE);
+    assert_int_equal(libusb_clear_halt(o.handle, COMMANDS), 0);
+    expect_good_spectrum(&o);
+    close_usb(&o);
+}
+
+static void a_buffer_too_small_overflows(void **state)
+{
+    (void)state;
+    struct opened o = open_usb();
+    int size;
+    assert_int_equal(command(o.handle, "\x09", 1), 0);
+    assert_int_equal(libusb_bulk_transfer(o.handle, SPECTRA, o.bytes, 1000, &size, REPLY_MS),
+                     LIBUSB_ERROR_OVERFLOW);
+    close_usb(&o);
+}
+
+static void a_stalled_spectrum_comes_back_after_clear_halt(void **state)
+{
+    (void)state;
+    struct opened o = open_usb();
+    set_fault(WIRE_SPECTROMETER, WIRE_STALL);
+    assert_int_equal(spectrum(o.handle, o.bytes, &o.size, REPLY_MS), LIBUSB_ERROR_PIPE);
+    assert_int_equal(libusb_clear_halt(o.handle, SPECTRA), 0);
+    expect_good_spectrum(&o);
+    set_fault(WIRE_SPECTROMETER, WIRE_FINE);
+    close_usb(&o);
+}
+
+static void a_silent_spectrometer_times_out_and_recovers(void **state)
+{
+    (void)state;
+    struct opened o = open_usb();
+    set_fault(WIRE_SPECTROMETER, WIRE_SILENT);
+    assert_int_equal(spectrum(o.handle, o.bytes, &o.size, SILENCE_MS), LIBUSB_ERROR_TIMEOUT);
+    assert_int_equal(o.size, 0);
+    set_fault(WIRE_SPECTROMETER, WIRE_FINE);
+    expect_good_spectrum(&o);
+    close_usb(&o);
+}
+
+static void garbage_and_short_spectra_show_as_such(void **state)
+{
+    (void)state;
+    struct opened o = open_usb();
+    set_fault(WIRE_SPECTROMETER, WIRE_GARBAGE);
+    assert_int_equal(spectrum(o.handle, o.bytes, &o.size, REPLY_MS), 0);
+    assert_int_equal(o.size, SPECTRUM_SIZE);
+    int beyond = 0; // a real pixel never exceeds the saturation of 26000
+    for (int p = 0; p < 2048; p++)
+        beyond += (o.bytes[2 * p] | o.bytes[2 * p + 1] << 8) > 26000;
+    assert_true(beyond > 500);
+    set_fault(WIRE_SPECTROMETER, WIRE_SHORT);
+    assert_int_equal(spectrum(o.handle, o.bytes, &o.size, REPLY_MS), 0);
+    assert_in_range(o.size, 1, SPECTRUM_SIZE - 1);
+    set_fault(WIRE_SPECTROMETER, WIRE_FINE);
+    expect_good_spectrum(&o);
+    close_usb(&o);
+}
+
+static int arrived, left;
+
+static int on_hotplug(libusb_context *usb, libusb_device *device, libusb_hotplug_event event,
+                      void *data)
+{
+    (void)usb, (void)device, (void)data;
+    arrived += event == LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED;
+    left += event == LIBUSB_HOTPLUG_EVENT_DEVICE_LEFT;
+    return 0;
+}
+
+static void on_transfer(struct libusb_transfer *transfer)
+{
+    *(int *)transfer->user_data = 1;
+}
+
+static void handle_events_until(libusb_context *usb, const int *flag, int value)
+{
+    for (int i = 0; i < 100 && *flag < value; i++)
+        libusb_handle_events_timeout_completed(usb, &(struct timeval){0, REPLY_MS * 10}, NULL);
+    assert_int_equal(*flag, value);
+}
+
+static void pulled_in_mid_transfer_and_plugged_again_ten_times(void **state)
+{
+    (void)state;
+    struct opened o = open_usb();
+    libusb_hotplug_callback_handle callback;
+    arrived = left = 0;
+    libusb_hotplug_register_callback(
+        o.usb, LIBUSB_HOTPLUG_EVENT_DEVICE_ARRIVED | LIBUSB_HOTPLUG_EVENT_DEVICE_LEFT, 0,
+        OCEAN_VENDOR, USB2000PLUS, LIBUSB_HOTPLUG_MATCH_ANY, on_hotplug, NULL, &callback);
+    struct libusb_transfer *transfer = libusb_alloc_transfer(0);
+    for (int cycle = 1; cycle <= 10; cycle++) {
+        int done = 0;
+        libusb_fill_bulk_transfer(transfer, o.handle, SPECTRA, o.bytes, sizeof(o.bytes),
+                                  on_transfer, &done, 0);
+        assert_int_equal(libusb_submit_transfer(transfer), 0);
+        set_fault(WIRE_SPECTROMETER, WIRE_UNPLUGGED);
+        handle_events_until(o.usb, &done, 1);
+        assert_int_equal(transfer->status, LIBUSB_TRANSFER_NO_DEVICE);
+        handle_events_until(o.usb, &left, cycle);
+        assert_int_equal(command(o.handle, "\x09", 1), LIBUSB_ERROR_NO_DEVICE);
+        libusb_close(o.handle);
+        assert_null(open_spectrometer(o.usb));
+
+        set_fault(WIRE_SPECTROMETER, WIRE_FINE);
+        handle_events_until(o.usb, &arrived, cycle);
+        o.handle = open_spectrometer(o.usb);
+        assert_non_null(o.handle);
+        command(o.handle, "\x02\xE8\x03\x00\x00", 5);
+        expect_good_spectrum(&o);
+    }
+    libusb_free_transfer(transfer);
+    libusb_hotplug_deregister_callback(o.usb, callback);
+    close_usb(&o);
+}
+
+// What another process sees; the test programs run it as their child.
+static int as_child(void)
+{
+    libusb_context *usb;
+    unsigned char bytes[4608];
+    int size;
+    if (libusb_init(&usb) != 0)
+        return 1;
+    libusb_device_handle *handle = libusb_open_device_with_vid_pid(usb, OCEAN_VENDOR, USB2000PLUS);
+    if (!handle || libusb_claim_interface(handle, 0) != 0)
+        return 2;
+    if (command(handle, "\x09", 1) != 0)
+        return 3;
+    if (libusb_bulk_transfer(handle, SPECTRA, bytes, sizeof(bytes), &size, REPLY_MS) != 0)
+        return 4;
+    libusb_close(handle);
+    libusb_exit(usb);
+    return size == SPECTRUM_SIZE && bytes[size - 1] == 0x69 ? 0 : 5;
+}
+
+static const char *own_path;
+
+static void another_process_reads_a_spectrum(void **state)
+{
+    (void)state;
+    pid_t child = fork();
+    if (child == 0) {
+        execl(own_path, own_path, "--child", (char *)NULL);
+        _exit(127);
+    }
+    int status;
+    assert_int_equal(waitpid(child, &status, 0), child);
+    assert_true(WIFEXITED(status));
+    assert_int_equal(WEXITSTATUS(status), 0);
+}
+
+// ---- camera ---------------------------------------------------------------------
+
+static int camera_read(hid_device *camera, unsigned char *report, int timeout_ms)
+{
+    return hid_read_timeout(camera, report, 64, timeout_ms);
+}
+
+static void camera_write(hid_device *camera, const char *bytes, size_t size)
+{
+    unsigned char report[64];
+    assert_int_equal(hid_write(camera, (const unsigned char *)bytes, size), (int)size);
+    if (bytes[0] != 0x16)
+        return;
+    do
+        assert_true(camera_read(camera, report, REPLY_MS) > 0);
+    while (report[0] != 0x22);
+    assert_int_equal(report[4], 0);
+}
+
+static hid_device *open_camera(void)
+{
+    hid_device *camera = hid_open(NINTENDO, REMOTE, L"EMU:WII:01");
+    if (!camera)
+        return NULL;
+    camera_write(camera, "\x13\x04", 2);
+    camera_write(camera, "\x1A\x04", 2);
+    camera_write(camera, "\x16\x04\xB0\x00\x30\x01\x08\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0", 22);
+    camera_write(camera,
+                 "\x16\x04\xB0\x00\x00\x09\x02\x00\x00\x71\x01\x00\xAA\x00\x64\0\0\0\0\0\0\0", 22);
+    camera_write(camera, "\x16\x04\xB0\x00\x1A\x02\x63\x03\0\0\0\0\0\0\0\0\0\0\0\0\0\0", 22);
+    camera_write(camera, "\x16\x04\xB0\x00\x33\x01\x03\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0", 22);
+    camera_write(camera, "\x12\x04\x33", 3);
+    return camera;
+}
+
+static void expect_points(hid_device *camera)
+{
+    unsigned char report[64] = {0};
+    for (int i = 0; i < 20 && !(report[0] == 0x33 && report[6] != 0xFF); i++)
+        assert_true(camera_read(camera, report, REPLY_MS) > 0);
+    int x = report[6] | (report[8] >> 4 & 3) << 8;
+    assert_true(abs(x - (512 - 167)) < 5); // 1334 px x 0.1 / 0.8, noise 0.5 px
+    assert_memory_equal(report + 15, "\xFF\xFF\xFF", 3);
+}
+
+static void the_camera_shows_points_through_hidapi(void **state)
+{
+    (void)state;
+    hid_device *camera = open_camera();
     assert_non_null(camera);
-    wchar_t text[64];
-    assert_int_equal(hid_get_serial_number_string(camera, text, 64), 0);
-    assert_int_equal(wcscmp(text, L"EMU:WII:01"), 0);
-    assert_int_equal(hid_write(camera, (const unsigned char *)"\x13\x06", 2), 2);
-    assert_int_equal(hid_read_timeout(camera, bytes, sizeof(bytes), REPLY_MS), 5);
-    assert_int_equal(bytes[0], 0x22);
+    expect_points(camera);
     hid_close(camera);
+}
+
+static void the_camera_names_itself(void **state)
+{
+    (void)state;
+    struct hid_device_info *info = hid_enumerate(NINTENDO, REMOTE);
+    assert_non_null(info);
+    assert_null(info->next);
+    assert_int_equal(wcscmp(info->product_string, L"Nintendo RVL-CNT-01"), 0);
+    assert_int_equal(wcscmp(info->serial_number, L"EMU:WII:01"), 0);
+    hid_free_enumeration(info);
+}
+
+static void the_camera_s_faults_show(void **state)
+{
+    (void)state;
+    unsigned char report[64];
+    hid_device *camera = open_camera();
+    assert_non_null(camera);
+    set_fault(WIRE_CAMERA, WIRE_SILENT);
+    while (camera_read(camera, report, 0) > 0)
+        continue; // what had come before
+    assert_int_equal(camera_read(camera, report, SILENCE_MS), 0);
+    set_fault(WIRE_CAMERA, WIRE_SHORT);
+    assert_int_equal(camera_read(camera, report, REPLY_MS), 9);
+    set_fault(WIRE_CAMERA, WIRE_FINE);
+    expect_points(camera);
+    set_fault(WIRE_CAMERA, WIRE_STALL); // a status unasked, then nothing
+    do
+        assert_true(camera_read(camera, report, REPLY_MS) > 0);
+    while (report[0] != 0x20);
+    assert_int_equal(camera_read(camera, report, SILENCE_MS), 0);
+    set_fault(WIRE_CAMERA, WIRE_FINE);
+    hid_close(camera);
+    camera = open_camera();
+    expect_points(camera);
+    hid_close(camera);
+}
+
+static void the_camera_s_link_breaks_and_returns_ten_times(void **state)
+{
+    (void)state;
+    unsigned char report[64];
+    for (int cycle = 0; cycle < 10; cycle++) {
+        hid_device *camera = open_camera();
+        assert_non_null(camera);
+        expect_points(camera);
+        set_fault(WIRE_CAMERA, WIRE_UNPLUGGED);
+        int size;
+        do
+            size = camera_read(camera, report, REPLY_MS);
+        while (size > 0);
+        assert_int_equal(size, -1);
+        assert_int_equal(hid_write(camera, (const unsigned char *)"\x15\x00", 2), -1);
+        hid_close(camera);
+        assert_null(hid_open(NINTENDO, REMOTE, NULL));
+        set_fault(WIRE_CAMERA, WIRE_FINE);
+    }
+}
+
+// ---- inclinometer ------------------------------------------------------------------
+
+static const char *in_folder(const char *name)
+{
+    static char path[64];
+    snprintf(path, sizeof(path), "%s/%s", folder, name);
+    return path;
+}
+
+static modbus_t *open_inclinometer(void)
+{
+    modbus_t *client = modbus_new_rtu(in_folder("inclinometer"), 9600, 'N', 8, 1);
+    assert_int_equal(modbus_set_slave(client, 0x50), 0);
+    modbus_set_response_timeout(client, 0, SILENCE_MS * 1000);
+    return client;
+}
+
+static void expect_tilt(modbus_t *client)
+{
+    uint16_t words[12];
+    modbus_set_response_timeout(client, REPLY_MS / 1000, 0);
+    assert_int_equal(modbus_read_registers(client, 0x34, 12, words), 12);
+    assert_true(fabs((int16_t)words[9] / 32768.0 * 180 - 30) < 0.2); // noise 0.02 degrees
+    assert_true(fabs((int16_t)words[1] / 2048.0 - 0.5) < 0.01);
+    modbus_set_response_timeout(client, 0, SILENCE_MS * 1000);
+}
+
+static void close_inclinometer(modbus_t *client)
+{
+    modbus_close(client);
+    modbus_free(client);
 }
 
 static void the_inclinometer_answers_through_libmodbus(void **state)
 {
     (void)state;
-    char path[64];
-    uint16_t words[3];
-    snprintf(path, sizeof(path), "%s/inclinometer", folder);
-    modbus_t *client = modbus_new_rtu(path, 9600, 'N', 8, 1);
-    modbus_set_slave(client, 0x50);
+    uint16_t word;
+    modbus_t *client = open_inclinometer();
     assert_int_equal(modbus_connect(client), 0);
-    assert_int_equal(modbus_read_registers(client, 0x3D, 3, words), 3);
-    assert_true(fabs((int16_t)words[0] / 32768.0 * 180 - 30) < 0.2);
-    modbus_close(client);
-    modbus_free(client);
+    expect_tilt(client);
+    assert_int_equal(modbus_write_register(client, 0x69, 0xB588), 1);
+    assert_int_equal(modbus_write_register(client, 0x03, 9), 1);
+    assert_int_equal(modbus_read_registers(client, 0x03, 1, &word), 1);
+    assert_int_equal(word, 9);
+    assert_int_equal(modbus_read_registers(client, 0x80, 1, &word), -1);
+    assert_int_equal(errno, EMBXILADD);
+    assert_int_equal(modbus_read_input_registers(client, 0x34, 1, &word), -1);
+    assert_int_equal(errno, EMBXILFUN);
+    modbus_set_slave(client, 0x51);
+    assert_int_equal(modbus_read_registers(client, 0x34, 1, &word), -1);
+    assert_int_equal(errno, ETIMEDOUT);
+    close_inclinometer(client);
+}
+
+static int open_line(const char *name)
+{
+    int fd = open(in_folder(name), O_RDWR | O_NOCTTY);
+    assert_true(fd >= 0);
+    struct termios raw;
+    tcgetattr(fd, &raw);
+    cfmakeraw(&raw);
+    tcsetattr(fd, TCSANOW, &raw);
+    return fd;
+}
+
+static size_t read_for(int fd, char *text, size_t size, const char *end, int timeout_ms)
+{
+    size_t have = 0;
+    text[0] = '\0';
+    struct pollfd wait = {.fd = fd, .events = POLLIN};
+    while (have + 1 < size && !(end && strstr(text, end)) && poll(&wait, 1, timeout_ms) == 1) {
+        ssize_t n = read(fd, text + have, size - 1 - have);
+        if (n <= 0)
+            break;
+        have += (size_t)n;
+        text[have] = '\0';
+    }
+    return have;
+}
+
+static void the_inclinometer_s_frames_are_the_documented_ones(void **state)
+{
+    (void)state;
+    char reply[64];
+    int fd = open_line("inclinometer");
+    assert_int_equal(write(fd, "\x50\x03\x00\x3D\x00\x03\x99\x86", 8), 8);
+    assert_int_equal(read_for(fd, reply, sizeof(reply), NULL, SILENCE_MS), 11);
+    assert_memory_equal(reply, "\x50\x03\x06", 3);
+    assert_int_equal(write(fd, "\x50\x06\x00\x69\xB5\x88\x22\xA1", 8), 8); // unlock: echoed
+    assert_int_equal(read_for(fd, reply, sizeof(reply), NULL, SILENCE_MS), 8);
+    assert_memory_equal(reply, "\x50\x06\x00\x69\xB5\x88\x22\xA1", 8);
+    close(fd);
+}
+
+static void the_inclinometer_s_faults_show(void **state)
+{
+    (void)state;
+    uint16_t words[3];
+    modbus_t *client = open_inclinometer();
+    assert_int_equal(modbus_connect(client), 0);
+    set_fault(WIRE_INCLINOMETER, WIRE_SILENT);
+    assert_int_equal(modbus_read_registers(client, 0x3D, 3, words), -1);
+    assert_int_equal(errno, ETIMEDOUT);
+    set_fault(WIRE_INCLINOMETER, WIRE_SHORT);
+    assert_int_equal(modbus_read_registers(client, 0x3D, 3, words), -1);
+    modbus_flush(client);
+    set_fault(WIRE_INCLINOMETER, WIRE_GARBAGE);
+    assert_int_equal(modbus_read_registers(client, 0x3D, 3, words), -1);
+    modbus_flush(client);
+    set_fault(WIRE_INCLINOMETER, WIRE_STALL);
+    assert_int_equal(modbus_read_registers(client, 0x3D, 3, words), -1);
+    assert_int_equal(errno, EMBXSBUSY);
+    set_fault(WIRE_INCLINOMETER, WIRE_FINE);
+    expect_tilt(client);
+    close_inclinometer(client);
+}
+
+static void the_inclinometer_s_line_breaks_and_returns_ten_times(void **state)
+{
+    (void)state;
+    uint16_t word;
+    for (int cycle = 0; cycle < 10; cycle++) {
+        modbus_t *client = open_inclinometer();
+        assert_int_equal(modbus_connect(client), 0);
+        expect_tilt(client);
+        set_fault(WIRE_INCLINOMETER, WIRE_UNPLUGGED);
+        assert_int_equal(modbus_read_registers(client, 0x34, 1, &word), -1);
+        close_inclinometer(client);
+        client = open_inclinometer();
+        assert_int_equal(modbus_connect(client), -1);
+        close_inclinometer(client);
+        set_fault(WIRE_INCLINOMETER, WIRE_FINE);
+    }
+}
+
+// ---- radiometer ----------------------------------------------------------------------
+
+static const char *tell(int fd, const char *text, const char *end, int timeout_ms)
+{
+    static char reply[4096];
+    assert_int_equal(write(fd, text, strlen(text)), (ssize_t)strlen(text));
+    read_for(fd, reply, sizeof(reply), end, timeout_ms);
+    return reply;
+}
+
+static void the_radiometer_measures_over_its_line(void **state)
+{
+    (void)state;
+    int fd = open_line("radiometer");
+    assert_string_equal(tell(fd, "PHOTO\r", "\r\n", REPLY_MS), " REMOTE MODE\r\n");
+    assert_string_equal(tell(fd, "D110\r", "\r\n", REPLY_MS), "00000,EMU65500123\r\n");
+    double Y;
+    assert_int_equal(sscanf(tell(fd, "M1\r", "\r\n", REPLY_MS), "00000,0,%lf,", &Y), 1);
+    assert_true(fabs(Y / 72.98 - 1) < 0.01); // 683 lm/W x 106.86 nm x 0.001, noise 0.1 %
+    const char *spectrum_text = tell(fd, "D5\r", " 780,", REPLY_MS);
+    assert_memory_equal(spectrum_text, "00000,0,", 8);
+    assert_non_null(strstr(spectrum_text, "\r\n 380,"));
+    tell(fd, "Q\r", "\r\n", SILENCE_MS);
+    close(fd);
+}
+
+static void the_radiometer_s_faults_show(void **state)
+{
+    (void)state;
+    int fd = open_line("radiometer");
+    tell(fd, "PHOTO\r", "\r\n", REPLY_MS);
+    set_fault(WIRE_RADIOMETER, WIRE_STALL);
+    assert_string_equal(tell(fd, "M1\r", "\r\n", REPLY_MS), "-0001\r\n");
+    set_fault(WIRE_RADIOMETER, WIRE_SILENT);
+    assert_string_equal(tell(fd, "M1\r", "\r\n", SILENCE_MS), "");
+    set_fault(WIRE_RADIOMETER, WIRE_SHORT);
+    assert_string_equal(tell(fd, "D110\r", "\r\n", SILENCE_MS), "00000,EMU");
+    set_fault(WIRE_RADIOMETER, WIRE_GARBAGE);
+    assert_string_not_equal(tell(fd, "D110\r", "\r\n", SILENCE_MS), "00000,EMU65500123\r\n");
+    set_fault(WIRE_RADIOMETER, WIRE_FINE);
+    assert_string_equal(tell(fd, "D110\r", "\r\n", REPLY_MS), "00000,EMU65500123\r\n");
+    close(fd);
+}
+
+static void the_radiometer_s_line_breaks_and_returns_ten_times(void **state)
+{
+    (void)state;
+    char byte;
+    for (int cycle = 0; cycle < 10; cycle++) {
+        int fd = open_line("radiometer");
+        assert_string_equal(tell(fd, "PHOTO\r", "\r\n", REPLY_MS), " REMOTE MODE\r\n");
+        set_fault(WIRE_RADIOMETER, WIRE_UNPLUGGED);
+        assert_true(read(fd, &byte, 1) <= 0);
+        close(fd);
+        assert_int_equal(access(in_folder("radiometer"), F_OK), -1);
+        set_fault(WIRE_RADIOMETER, WIRE_FINE);
+    }
+}
+
+// ---- start ----------------------------------------------------------------------------
+
+static void a_serial_that_hides_the_emulation_is_refused(void **state)
+{
+    (void)state;
+    struct wire_options options = {.serial = {"EMU1", "EMU2", "12345", "EMU4"}};
+    struct error err = {0};
+    assert_null(wire_start(&options, &err));
+    assert_int_equal(err.code, ERROR_CONFIG);
+    assert_non_null(strstr(err.text, "12345"));
+}
+
+static void the_calibration_file_is_there(void **state)
+{
+    (void)state;
+    double nm = 0, k = 0;
+    int lines = 0;
+    FILE *file = fopen(in_folder("spectrometer.cal"), "r");
+    assert_non_null(file);
+    assert_int_equal(fscanf(file, "nm,uJ_per_count\n"), 0);
+    while (fscanf(file, "%lf,%lf\n", &nm, &k) == 2) {
+        assert_int_equal((int)nm, 340 + lines++);
+        assert_true(k > 0 && k < 1);
+    }
+    fclose(file);
+    assert_int_equal((int)nm, 1027);
 }
 
 int main(int argc, char **argv)
 {
-    (void)argc;
+    own_path = argv[0];
+    if (argc > 1)
+        return as_child();
     const char *preload = getenv("LD_PRELOAD");
     if (!preload || !strstr(preload, "umockdev")) {
         execlp("umockdev-wrapper", "umockdev-wrapper", argv[0], (char *)NULL);
@@ -185,8 +685,29 @@ int main(int argc, char **argv)
     }
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_spectrometer_tells_its_serial_and_a_spectrum),
-        cmocka_unit_test(the_camera_answers_through_hidapi),
+        cmocka_unit_test(an_unknown_command_is_a_pipe_error),
+        cmocka_unit_test(a_buffer_too_small_overflows),
+        cmocka_unit_test(a_stalled_spectrum_comes_back_after_clear_halt),
+        cmocka_unit_test(a_silent_spectrometer_times_out_and_recovers),
+        cmocka_unit_test(garbage_and_short_spectra_show_as_such),
+        cmocka_unit_test(pulled_in_mid_transfer_and_plugged_again_ten_times),
+        cmocka_unit_test(another_process_reads_a_spectrum),
+        cmocka_unit_test(the_camera_shows_points_through_hidapi),
+        cmocka_unit_test(the_camera_names_itself),
+        cmocka_unit_test(the_camera_s_faults_show),
+        cmocka_unit_test(the_camera_s_link_breaks_and_returns_ten_times),
         cmocka_unit_test(the_inclinometer_answers_through_libmodbus),
+        cmocka_unit_test(the_inclinometer_s_frames_are_the_documented_ones),
+        cmocka_unit_test(the_inclinometer_s_faults_show),
+        cmocka_unit_test(the_inclinometer_s_line_breaks_and_returns_ten_times),
+        cmocka_unit_test(the_radiometer_measures_over_its_line),
+        cmocka_unit_test(the_radiometer_s_faults_show),
+        cmocka_unit_test(the_radiometer_s_line_breaks_and_returns_ten_times),
+        cmocka_unit_test(a_serial_that_hides_the_emulation_is_refused),
+        cmocka_unit_test(the_calibration_file_is_there),
     };
-    return cmocka_run_group_tests(tests, start, stop);
+    hid_init();
+    int failed = cmocka_run_group_tests(tests, start, stop);
+    hid_exit();
+    return failed;
 }
