@@ -71,13 +71,27 @@ static const char *shown_token(const struct token *token, char shown[TEXT_SHOWN]
     return text_shown(shown, token->text, token->size);
 }
 
-// A copy whose bytes outside UTF-8 are '?'.
-static char *copy_text(const char *text, size_t size)
+static void undouble_quotes(char *text)
 {
-    char *copy = strndup(text, size);
-    if (copy)
-        for (size_t at; (at = text_utf8_end(copy, size)) < size;)
-            copy[at] = '?';
+    char *to = text;
+    for (; *text; text++) {
+        *to++ = *text;
+        if (text[0] == '"' && text[1] == '"')
+            text++;
+    }
+    *to = 0;
+}
+
+// A token's text: bytes outside UTF-8 as '?', doubled quotes single.
+static char *copy_text(const struct token *token)
+{
+    char *copy = strndup(token->text, token->size);
+    if (!copy)
+        return NULL;
+    for (size_t at; (at = text_utf8_end(copy, token->size)) < token->size;)
+        copy[at] = '?';
+    if (token->quoted)
+        undouble_quotes(copy);
     return copy;
 }
 
@@ -196,17 +210,6 @@ static bool read_promise(struct reader *r, struct promise *promise, size_t most)
     return true;
 }
 
-static void undouble_quotes(char *text)
-{
-    char *to = text;
-    for (; *text; text++) {
-        *to++ = *text;
-        if (text[0] == '"' && text[1] == '"')
-            text++;
-    }
-    *to = 0;
-}
-
 static bool add_keyword(struct reader *r, struct cgats *file, const struct token *name)
 {
     char shown[TEXT_SHOWN];
@@ -219,11 +222,10 @@ static bool add_keyword(struct reader *r, struct cgats *file, const struct token
         return out_of_memory(r);
     file->keywords = more;
     struct cgats_keyword k = {strndup(name->text, name->size),
-                              copy_text(r->token.text, r->token.size), name->line};
+                              copy_text(&r->token), name->line};
     more[file->keyword_count++] = k;
     if (!k.name || !k.value)
         return out_of_memory(r);
-    undouble_quotes(k.value);
     for (size_t i = 0; i + 1 < file->keyword_count; i++)
         if (!strcmp(more[i].name, k.name) && strcmp(more[i].value, k.value))
             return fail(r->err, ERROR_DATA, "%s:%d: %s: \"%s\" contradicts line %d", r->path,
@@ -361,7 +363,7 @@ static bool add_cell(struct reader *r, struct building *b)
         t->lines[t->rows++] = token->line;
     }
     if ((int)column == b->label_column &&
-        !(t->labels[t->rows - 1] = copy_text(token->text, token->size)))
+        !(t->labels[t->rows - 1] = copy_text(token)))
         return out_of_memory(r);
     char shown[TEXT_SHOWN];
     double *value = &t->values[b->cells++];

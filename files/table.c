@@ -55,6 +55,20 @@ static bool blank(char c)
     return c == ' ' || c == '\t';
 }
 
+// Between cells that blanks separate, a tab is a blank like any other.
+static bool separates(const struct csv *csv, char c)
+{
+    return c == csv->separator || (csv->separator == ' ' && c == '\t');
+}
+
+// Blanks that mean nothing: those before a cell, but no separating tab.
+static void skip_padding(struct csv *csv)
+{
+    while (csv->at < csv->stop && blank(*csv->at) &&
+           !(csv->separator == '\t' && *csv->at == '\t'))
+        csv->at++;
+}
+
 // The next line that says something; ends are LF, CR LF and CR.
 static bool next_line(struct csv *csv)
 {
@@ -66,8 +80,7 @@ static bool next_line(struct csv *csv)
         if (csv->next < csv->end && *csv->stop == '\r' && *csv->next == '\n')
             csv->next++;
         csv->line++;
-        while (csv->at < csv->stop && blank(*csv->at) && csv->separator != *csv->at)
-            csv->at++;
+        skip_padding(csv);
         while (csv->at < csv->stop && blank(csv->stop[-1]))
             csv->stop--;
         if (csv->at < csv->stop && *csv->at != '#')
@@ -95,31 +108,34 @@ static bool quoted_cell(struct csv *csv, struct cell *cell, struct error *err)
     return true;
 }
 
+static bool text_after_quote(const struct csv *csv, struct error *err)
+{
+    return fail(err, ERROR_DATA, "%s:%d: text after a closing quote", csv->table->path, csv->line);
+}
+
 // Takes one cell off the line; *more tells whether a separator followed it.
 static bool take_cell(struct csv *csv, struct cell *cell, bool *more, struct error *err)
 {
-    while (csv->at < csv->stop && blank(*csv->at) && *csv->at != csv->separator)
-        csv->at++;
+    skip_padding(csv);
     if (csv->at < csv->stop && *csv->at == '"') {
         if (!quoted_cell(csv, cell, err))
             return false;
     } else {
-        const char *from = csv->at;
-        const char *end = memchr(from, csv->separator, csv->stop - from);
-        csv->at = end = end ? end : csv->stop;
-        while (end > from && blank(end[-1]))
+        const char *from = csv->at, *end;
+        while (csv->at < csv->stop && !separates(csv, *csv->at))
+            csv->at++;
+        for (end = csv->at; end > from && blank(end[-1]);)
             end--;
         *cell = (struct cell){from, end - from, false};
     }
-    while (csv->at < csv->stop && blank(*csv->at) && *csv->at != csv->separator)
-        csv->at++;
-    if (csv->at < csv->stop && *csv->at != csv->separator)
-        return fail(err, ERROR_DATA, "%s:%d: text after a closing quote", csv->table->path,
-                    csv->line);
+    const char *after = csv->at;
+    skip_padding(csv);
     *more = csv->at < csv->stop;
+    if (*more && csv->separator == ' ')
+        return csv->at > after || text_after_quote(csv, err);
+    if (*more && *csv->at != csv->separator)
+        return text_after_quote(csv, err);
     csv->at += *more;
-    while (csv->separator == ' ' && csv->at < csv->stop && blank(*csv->at))
-        csv->at++;
     return true;
 }
 
