@@ -85,6 +85,8 @@ static const struct setting display_rows[] = {
 static const struct setting lamps_rows[] = {
     {"folder", SETTING_TEXT, AT(lamps.folder), ROOM(lamps.folder), 0, 0, "", NULL, "lamps",
      "Folder of the taught lamps (NAME.ini, NAME.sp, luminance map)."},
+    {"declared", SETTING_TEXT, AT(lamps.declared), ROOM(lamps.declared), 0, 0, "", NULL, "",
+     "Lamp taken for granted in a booth without a spectrometer; empty: none."},
     {0}};
 
 static const struct setting materials_rows[] = {

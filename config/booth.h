@@ -73,6 +73,7 @@ struct booth_settings {
     } display;
     struct {
         char folder[512];
+        char declared[64]; // lamp taken for granted where there is no spectrometer, "" = none
     } lamps;
     struct {
         char folder[512];

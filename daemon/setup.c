@@ -18,12 +18,22 @@ static bool load_display(struct setup *s, struct error *err)
     return s->has_display;
 }
 
+static bool declared_is_there(const struct setup *s, struct error *err)
+{
+    const char *declared = s->settings.lamps.declared;
+    for (int i = 0; i < s->lamps.count; i++)
+        if (!strcmp(declared, s->lamps.lamps[i].file.name))
+            return true;
+    return !*declared || fail(err, ERROR_CONFIG, "[lamps] declared: \"%s\" was not taught in %s",
+                              declared, s->settings.lamps.folder);
+}
+
 static bool load_lamps(struct setup *s, struct error *err)
 {
     const struct booth_settings *b = &s->settings;
     if (!path_exists(b->lamps.folder))
-        return true;
-    if (!lamps_load(b->lamps.folder, &s->lamps, err))
+        return declared_is_there(s, err);
+    if (!lamps_load(b->lamps.folder, &s->lamps, err) || !declared_is_there(s, err))
         return false;
     s->lights = calloc(s->lamps.count + 1, sizeof *s->lights);
     if (!s->lights)

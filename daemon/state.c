@@ -2,6 +2,7 @@
 #include "daemon/state.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "colorimetry/colour.h"
 
@@ -36,6 +37,12 @@ static void limit(struct estimator *e, const struct booth_settings *settings,
     e->state.lamp.level = 0;
     e->state.lamp.verdict = LAMP_NONE;
     e->lamp = (struct memory){0};
+    for (int i = 0; i < taught->count && !booth_spectrometer(settings); i++)
+        if (!strcmp(taught->lamps[i].name, settings->lamps.declared)) {
+            e->state.lamp.index = i;
+            e->state.lamp.level = 1;
+            e->state.lamp.verdict = LAMP_KNOWN;
+        }
 }
 
 void estimator_init(struct estimator *e, const struct booth_settings *settings,
@@ -114,13 +121,11 @@ static void follow_level(struct estimator *e, double level, double dt_s)
     *smooth += off * fmax(mean, smoothing);
 }
 
-// While another verdict waits for its confirmation, the level of the lamp that
-// was on says nothing.
+// While another verdict waits for its confirmation, a reading speaks neither
+// for the lamp that was on nor for its level.
 static bool verdict_in_doubt(const struct classifier *c)
 {
-    return c->candidate_count > 0 &&
-           (c->candidate != c->verdict ||
-            (c->verdict == LAMP_KNOWN && c->candidate_index != c->index));
+    return c->candidate_count > 0;
 }
 
 static void take_lamp(struct estimator *e, const struct spectrum_sample *s, int64_t now_ns)
@@ -131,21 +136,17 @@ static void take_lamp(struct estimator *e, const struct spectrum_sample *s, int6
     e->state.lamp.distance = b.distance;
     e->state.lamp.lux = xyz_absolute(&s->irradiance, OBSERVER_1931_2).Y;
     double dt_s = e->lamp.ever ? seconds(s->taken.latest_ns - e->lamp.seen_ns) : 0;
-    switch (b.verdict) {
-    case LAMP_UNKNOWN:
-        e->lamp.usable = false;
+    e->lamp.usable = b.verdict != LAMP_UNKNOWN && !verdict_in_doubt(&e->classifier);
+    if (!e->lamp.usable)
         return;
-    case LAMP_NONE:
+    if (b.verdict == LAMP_NONE) {
         e->state.lamp.index = -1;
         e->state.lamp.level = 0;
-        break;
-    case LAMP_KNOWN:
+    } else {
         if (b.index != e->state.lamp.index)
             e->level_readings = e->level_steps = 0;
-        if (b.index != e->state.lamp.index || !verdict_in_doubt(&e->classifier))
-            follow_level(e, b.level, fmax(dt_s, 0.001));
+        follow_level(e, b.level, fmax(dt_s, 0.001));
         e->state.lamp.index = b.index;
-        break;
     }
     remember(&e->lamp, &s->taken, now_ns, b.confidence);
 }

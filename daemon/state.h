@@ -90,6 +90,7 @@ void estimator_change(struct estimator *e, const struct booth_settings *settings
 //   lamp_hold_s and then gives none: a proof under light that is not the one
 //   shown would be wrong. A silent or saturated spectrometer keeps it for
 //   good, STALE after lamp_hold_s: nothing says that the light changed.
+//   Without a spectrometer the lamp that the settings declare is on, PRESET.
 // - Level: averaged from the first reading on, then smoothed over level_s; two
 //   readings in a row more than 3 % off on the same side are a dimmer's work
 //   and count at once.

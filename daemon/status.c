@@ -67,7 +67,8 @@ static void warnings(const struct booth *b, struct snapshot *s)
     if (booth_spectrometer(&s->settings))
         warn_of_lamp(s);
     else
-        warn(s, "there is no spectrometer: no lamp is known");
+        warn(s, "there is no spectrometer: %s",
+             *s->lamp_name ? "the lamp is taken for granted" : "no lamp is known");
     warn_of_belief(s, "tilt", &s->state.tilt.belief, booth_accelerometer(&s->settings));
     warn_of_belief(s, "place of the eye", &s->state.eye.belief, booth_tracker(&s->settings));
     if (s->out_of_gamut > 0)
