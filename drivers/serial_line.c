@@ -65,18 +65,18 @@ void serial_line_close(struct serial_line *line)
     line->fd = -1;
 }
 
-// Waits for input at most wait_ms; *came tells whether bytes were added.
+// Waits for input at most wait_ms; *came tells whether bytes were added. What
+// finds no room waits in the kernel.
 static bool take(struct serial_line *line, int wait_ms, bool *came, struct error *err)
 {
-    struct pollfd p = {.fd = line->fd, .events = POLLIN};
+    bool full = line->used == sizeof line->pending;
+    struct pollfd p = {.fd = line->fd, .events = full ? 0 : POLLIN};
     *came = false;
     int ready = poll(&p, 1, wait_ms);
-    if (ready < 0 && errno != EINTR)
+    if ((ready < 0 && errno != EINTR) || (full && ready > 0))
         return gone(line, err);
     if (ready <= 0)
         return true;
-    if (line->used == sizeof line->pending)
-        line->used = 0;
     ssize_t count = read(line->fd, line->pending + line->used, sizeof line->pending - line->used);
     if (count > 0)
         line->used += (size_t)count;
@@ -134,6 +134,8 @@ bool serial_line_read(struct serial_line *line, char *text, size_t size, int wai
         int wait = deadline_ms(until, wait_ms);
         if (wait <= 0)
             return fail(err, ERROR_RETRY, "%s: no answer in time", line->path);
+        if (line->used == sizeof line->pending)
+            return fail(err, ERROR_DATA, "%s: a line without an end", line->path);
         if (!take(line, wait, &came, err))
             return false;
     }
@@ -147,9 +149,9 @@ bool serial_line_quiet(struct serial_line *line, int quiet_ms, int64_t deadline_
         int wait = deadline_ms(deadline_ns, quiet_ms);
         if (wait <= 0)
             return fail(err, ERROR_RETRY, "%s: the line does not fall quiet", line->path);
+        line->used = 0;
         if (!take(line, wait, &came, err))
             return false;
-        line->used = 0;
     }
     return true;
 }
