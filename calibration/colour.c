@@ -100,6 +100,11 @@ static int print_differences(FILE *in, const char *name)
 
 static int command_deltae(int argc, char **argv)
 {
+    if (argc == 2 && !strcmp(argv[1], "--help")) {
+        puts("usage: boothcal colour deltae [FILE]\n"
+             "Reads L1 a1 b1 L2 a2 b2 a line from FILE or standard input; writes CIEDE2000.");
+        return COMMAND_FINE;
+    }
     if (argc > 2 || (argc == 2 && argv[1][0] == '-' && argv[1][1]))
         return command_bad_usage("usage: boothcal colour deltae [FILE]");
     if (argc < 2 || !strcmp(argv[1], "-"))

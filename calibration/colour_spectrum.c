@@ -94,6 +94,16 @@ static int set_option(struct options *o, int option, bool *mode_given)
     return COMMAND_USAGE;
 }
 
+static void print_help(void)
+{
+    puts("usage: boothcal colour spectrum --light FILE|NAME [--reflectance TABLE]\n"
+         "           [--observer 1931-2|1964-10|2015-2|2015-10]\n"
+         "           [--mode full|bands|product] [--bands FILE|COUNT] [--json]\n"
+         "Files are CSV (nm, v1, v2, ...) or CGATS (.sp). Without --reflectance the lamp\n"
+         "itself is shown. Y = 100 for the perfect white; the white of Lab is the lamp;\n"
+         "CCT and Duv are by the 1931 observer.");
+}
+
 static int parse(int argc, char **argv, struct options *o)
 {
     static const struct option LONG[] = {
@@ -303,6 +313,10 @@ int command_colour_spectrum(int argc, char **argv)
     struct options o = {.observer = OBSERVER_1931_2, .mode = MODE_FULL};
     struct rows rows = {0};
     struct error err;
+    if (argc == 2 && !strcmp(argv[1], "--help")) {
+        print_help();
+        return COMMAND_FINE;
+    }
     int code = parse(argc, argv, &o);
     if (code)
         return code;

@@ -142,7 +142,7 @@ static int line_of(const struct cgats *file, const char *key)
 static bool contradicts(const struct cgats *file, const char *key, double value,
                         const char *fields_say, double is, struct error *err)
 {
-    return fail(err, ERROR_DATA, "%s:%d: %s is %g but %s %g", file->table.path,
+    return fail(err, ERROR_DATA, "%s:%d: %s is %g but %s%g", file->table.path,
                 line_of(file, key), key, value, fields_say, is);
 }
 
@@ -157,7 +157,7 @@ static bool check_header(const struct cgats *file, struct fields *f, struct erro
         return false;
     double first = f->nm[0], last = f->nm[f->count - 1];
     if (bands != (double)f->count)
-        return contradicts(file, "SPECTRAL_BANDS", bands, "the number of SPEC_ fields is",
+        return contradicts(file, "SPECTRAL_BANDS", bands, "the number of SPEC_ fields is ",
                            (double)f->count, err);
     if (fabs(start - first) > FIELD_SLACK_NM)
         return contradicts(file, "SPECTRAL_START_NM", start, "the first field is SPEC_", first, err);
