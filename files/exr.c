@@ -11,7 +11,7 @@
 #include "files/text.h"
 #include "files/write.h"
 
-enum { SIDE_MOST = 16384, ATTRIBUTES_MOST = 16 };
+enum { SIDE_MOST = 16384, ATTRIBUTES_MOST = 16, NAME_MOST = 31 };
 
 // One image fills memory before it fills the range of its sides.
 static const size_t BYTES_MOST = (size_t)4 << 30;
@@ -218,23 +218,27 @@ static bool check_kind(exr_context_t context, const struct stream *stream, struc
     return true;
 }
 
-static bool take_channels(const exr_attr_chlist_t *list, const struct stream *stream,
-                          struct exr *image, struct error *err)
+static bool is_listed_before(const exr_attr_chlist_t *list, int index)
+{
+    for (int c = 0; c < index; c++)
+        if (!strcmp(list->entries[c].name.str, list->entries[index].name.str))
+            return true;
+    return false;
+}
+
+static bool check_channels(const exr_attr_chlist_t *list, const struct stream *stream,
+                           struct error *err)
 {
     for (int c = 0; c < list->num_channels; c++) {
         const exr_attr_chlist_entry_t *entry = &list->entries[c];
         char shown[TEXT_SHOWN];
         text_shown(shown, entry->name.str, entry->name.length);
-        if (entry->name.length < 1 || entry->name.length >= (int)sizeof image->names[c] ||
-            exr_channel(image, entry->name.str) >= 0)
-            return fail(err, ERROR_DATA,
-                        "%s: channel name \"%s\"; allowed: 1..31 bytes, each name once",
-                        stream->path, shown);
+        if (entry->name.length < 1 || entry->name.length > NAME_MOST || is_listed_before(list, c))
+            return fail(err, ERROR_DATA, "%s: channel name \"%s\"; allowed: 1..%d bytes, each once",
+                        stream->path, shown, NAME_MOST);
         if (entry->pixel_type == EXR_PIXEL_UINT || entry->x_sampling != 1 || entry->y_sampling != 1)
-            return fail(err, ERROR_DATA,
-                        "%s: channel %s; allowed: float or half at every pixel", stream->path,
-                        shown);
-        memcpy(image->names[c], entry->name.str, entry->name.length);
+            return fail(err, ERROR_DATA, "%s: channel %s; allowed: float or half at every pixel",
+                        stream->path, shown);
     }
     return true;
 }
@@ -247,7 +251,8 @@ static void take_attributes(exr_context_t context, struct exr *image)
         const exr_attribute_t *a;
         if (exr_get_attribute_by_index(context, 0, EXR_ATTR_LIST_FILE_ORDER, i, &a))
             continue;
-        if (strlen(a->name) >= sizeof image->numbers[0].name)
+        bool structural = !strcmp(a->name, "name") || !strcmp(a->name, "type");
+        if (structural || strlen(a->name) >= sizeof image->numbers[0].name)
             continue;
         if (a->type == EXR_ATTR_DOUBLE)
             exr_set_number(image, a->name, a->d);
@@ -290,13 +295,17 @@ static bool take_header(exr_context_t context, struct stream *stream, struct exr
     bool sane = width >= 1 && width <= SIDE_MOST && height >= 1 && height <= SIDE_MOST;
     if (!check_size(sane ? width : 0, sane ? height : 0, list->num_channels, err))
         return while_doing(err, "%s", stream->path);
+    if (!check_channels(list, stream, err))
+        return false;
     *first_line = window.min.y;
     if (!check_chunks(context, window.min.y, width, height))
         return malformed(stream, err);
     if (!exr_init(image, width, height, list->num_channels, err))
         return while_doing(err, "%s", stream->path);
+    for (int c = 0; c < image->channels; c++)
+        snprintf(image->names[c], sizeof image->names[c], "%s", list->entries[c].name.str);
     take_attributes(context, image);
-    return take_channels(list, stream, image, err);
+    return true;
 }
 
 // Aims every channel of a decoding or encoding pipeline at its plane; the
@@ -438,8 +447,8 @@ static bool check_names(const char *path, const struct exr *image, struct error 
     for (int c = 0; c < image->channels; c++)
         if (!*image->names[c] || exr_channel(image, image->names[c]) != c)
             return fail(err, ERROR_RANGE,
-                        "%s: channel %d is named \"%s\"; allowed: 1..31 bytes, each name once", path,
-                        c, image->names[c]);
+                        "%s: channel %d is named \"%s\"; allowed: 1..%d bytes, each once", path, c,
+                        image->names[c], NAME_MOST);
     return true;
 }
 
