@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "calibration/fit_ceres.h"
+#include "colorimetry/metric.h"
 
 // Curves are g(count) ^ CURVE_POWER with g a monotone cubic B-spline: nearly
 // straight for any panel, so that few coefficients bend it.
@@ -26,7 +27,7 @@ struct target {
     int first[3];        // first of four spline coefficients per channel
     double weight[3][4]; // their B-spline values at the patch's counts
     struct lab lab;
-    double metric[3][3]; // upper triangular: |metric (lab - seen)| = dE00 near lab
+    struct mat3 metric; // |metric (lab - seen)| = dE00 near lab
 };
 
 struct fit {
@@ -89,19 +90,6 @@ static double coefficients(const struct fit *f, const double *q, double *steps, 
 
 // ---- residuals -------------------------------------------------------------
 
-static double lab_f(double t, double *slope)
-{
-    const double epsilon = 216.0 / 24389.0;
-    const double kappa = 24389.0 / 27.0;
-    if (t > epsilon) {
-        double root = cbrt(t);
-        *slope = 1 / (3 * root * root);
-        return root;
-    }
-    *slope = kappa / 116;
-    return (kappa * t + 16) / 116;
-}
-
 // Linear light of one channel and its slope by each q.
 static double channel_light(const struct fit *f, const struct target *t, int c, const double *q,
                             double *by_q)
@@ -122,16 +110,23 @@ static double channel_light(const struct fit *f, const struct target *t, int c, 
     return pow(g, CURVE_POWER);
 }
 
-// d Lab / d (X, Y, Z over white).
-static struct lab lab_slopes(const double t[3], double slopes[3][3])
+// d residuals / d x, from d residuals / d XYZ.
+static void patch_slopes(const struct fit *f, const double *x, struct mat3 by_xyz,
+                         const double light[4], double by_q[3][SLOPES_MOST], double *jacobian)
 {
-    double d[3];
-    double fx = lab_f(t[0], &d[0]);
-    double fy = lab_f(t[1], &d[1]);
-    double fz = lab_f(t[2], &d[2]);
-    const double rows[3][3] = {{0, 116 * d[1], 0}, {500 * d[0], -500 * d[1], 0}, {0, 200 * d[1], -200 * d[2]}};
-    memcpy(slopes, rows, sizeof rows);
-    return (struct lab){116 * fy - 16, 500 * (fx - fy), 200 * (fy - fz)};
+    const double white[3] = {f->m->white.X, f->m->white.Y, f->m->white.Z};
+    memset(jacobian, 0, 3 * (size_t)f->parameters * sizeof *jacobian);
+    for (int r = 0; r < 3; r++) {
+        double *row = jacobian + r * f->parameters;
+        for (int i = 0; i < 3; i++) {
+            double slope = by_xyz.m[r][i] * white[i];
+            for (int n = 0; n < 4; n++)
+                row[4 * i + n] = slope * light[n];
+            for (int n = 0; n < 3; n++)
+                for (int j = 0; j < f->slopes; j++)
+                    row[MATRIX + n * f->slopes + j] += slope * x[4 * i + n] * by_q[n][j];
+        }
+    }
 }
 
 // x: matrix rows over white (X r g b black, Y ..., Z ...), then three times q.
@@ -139,36 +134,26 @@ static bool patch_residuals(const struct fit *f, int index, const double *x, dou
                             double *jacobian)
 {
     const struct target *t = &f->targets[index];
+    const double white[3] = {f->m->white.X, f->m->white.Y, f->m->white.Z};
     double light[4] = {0, 0, 0, 1};
     double by_q[3][SLOPES_MOST];
-    double over_white[3] = {0, 0, 0};
-    double slopes[3][3];
-    for (int c = 0; c < 3; c++)
-        light[c] = channel_light(f, t, c, x + MATRIX + c * f->slopes, jacobian ? by_q[c] : NULL);
+    double c[3] = {0, 0, 0};
+    for (int n = 0; n < 3; n++)
+        light[n] = channel_light(f, t, n, x + MATRIX + n * f->slopes, jacobian ? by_q[n] : NULL);
     for (int i = 0; i < 3; i++)
-        for (int c = 0; c < 4; c++)
-            over_white[i] += x[4 * i + c] * light[c];
-    struct lab seen = lab_slopes(over_white, slopes);
-    const double apart[3] = {seen.L - t->lab.L, seen.a - t->lab.a, seen.b - t->lab.b};
-    for (int r = 0; r < 3; r++) {
-        residuals[r] = 0;
-        for (int k = 0; k < 3; k++)
-            residuals[r] += t->metric[r][k] * apart[k];
-        if (!jacobian)
-            continue;
-        double *row = jacobian + r * f->parameters;
-        for (int i = 0; i < 3; i++) {
-            double by_xyz = 0;
-            for (int k = 0; k < 3; k++)
-                by_xyz += t->metric[r][k] * slopes[k][i];
-            for (int c = 0; c < 4; c++)
-                row[4 * i + c] = by_xyz * light[c];
-            for (int c = 0; c < 3; c++)
-                for (int j = 0; j < f->slopes; j++)
-                    row[MATRIX + c * f->slopes + j] =
-                        (i ? row[MATRIX + c * f->slopes + j] : 0) + by_xyz * x[4 * i + c] * by_q[c][j];
-        }
-    }
+        for (int n = 0; n < 4; n++)
+            c[i] += x[4 * i + n] * light[n] * white[i];
+    struct xyz seen = {c[0], c[1], c[2]};
+    struct lab lab;
+    if (!lab_of(seen, f->m->white, &lab, NULL))
+        return false;
+    struct vec3 apart = {lab.L - t->lab.L, lab.a - t->lab.a, lab.b - t->lab.b};
+    struct vec3 r = mat3_apply(t->metric, apart);
+    residuals[0] = r.x;
+    residuals[1] = r.y;
+    residuals[2] = r.z;
+    if (jacobian)
+        patch_slopes(f, x, mat3_mul(t->metric, lab_slopes(seen, f->m->white)), light, by_q, jacobian);
     return true;
 }
 
@@ -200,43 +185,7 @@ static bool residuals_of(void *context, int group, const double *x, double *resi
                                : smooth_residuals(f, group - f->m->count, x, residuals, jacobian);
 }
 
-// ---- the metric of CIEDE2000 -----------------------------------------------
-
-static double squared(struct lab at, double dL, double da, double db)
-{
-    double de = delta_e_2000(at, (struct lab){at.L + dL, at.a + da, at.b + db});
-    return de * de;
-}
-
-// CIEDE2000 is no distance to differentiate at zero or across its hue branch
-// (Sharma 2005); its local quadratic form is, and equals it for small steps.
-static void metric_at(struct lab at, double upper[3][3])
-{
-    const double h = 0.1; // Lab units: large against rounding, small against curvature
-    const double step[3][3] = {{h, 0, 0}, {0, h, 0}, {0, 0, h}};
-    double g[3][3];
-    for (int i = 0; i < 3; i++)
-        g[i][i] = squared(at, step[i][0], step[i][1], step[i][2]) / (h * h);
-    for (int i = 0; i < 3; i++)
-        for (int j = i + 1; j < 3; j++) {
-            double both = squared(at, step[i][0] + step[j][0], step[i][1] + step[j][1],
-                                  step[i][2] + step[j][2]) / (h * h);
-            g[i][j] = (both - g[i][i] - g[j][j]) / 2;
-        }
-    memset(upper, 0, 9 * sizeof upper[0][0]);
-    for (int i = 0; i < 3; i++) {
-        double left = g[i][i];
-        for (int k = 0; k < i; k++)
-            left -= upper[k][i] * upper[k][i];
-        upper[i][i] = sqrt(fmax(left, 1e-3 * g[i][i]));
-        for (int j = i + 1; j < 3; j++) {
-            double rest = g[i][j];
-            for (int k = 0; k < i; k++)
-                rest -= upper[k][i] * upper[k][j];
-            upper[i][j] = rest / upper[i][i];
-        }
-    }
-}
+// ---- targets ---------------------------------------------------------------
 
 static bool aim(struct fit *f, struct error *err)
 {
@@ -248,7 +197,7 @@ static bool aim(struct fit *f, struct error *err)
             t->first[c] = splines_at(f, counts[c], t->weight[c]);
         if (!lab_of(p->xyz, f->m->white, &t->lab, err))
             return while_doing(err, "%s", f->m->path);
-        metric_at(t->lab, t->metric);
+        t->metric = de00_metric(t->lab);
     }
     return true;
 }

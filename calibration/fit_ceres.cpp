@@ -63,7 +63,7 @@ bool Solve(const least_squares &p, std::vector<double> &x, least_squares_result 
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::DENSE_QR;
     options.max_num_iterations = p.iterations;
-    options.function_tolerance = 1e-10;
+    options.function_tolerance = p.tolerance > 0 ? p.tolerance : 1e-10;
     options.logging_type = ceres::SILENT;
     options.num_threads = 1;
     ceres::Solver::Summary summary;

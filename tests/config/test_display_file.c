@@ -13,6 +13,8 @@
 
 #include <cmocka.h>
 
+#include "tests/fakes/near.h"
+
 static char folder[] = "/tmp/boothd-display-XXXXXX";
 static char path[64];
 
@@ -81,7 +83,7 @@ static void refused(const char *from, const char *to, const char *says)
     assert_false(display_load(path, &untouched, NULL, &err));
     assert_non_null(strstr(err.text, path));
     assert_non_null(strstr(err.text, says));
-    assert_float_equal(untouched.condition, -1, 0);
+    assert_near(untouched.condition, -1, 0);
 }
 
 static void what_is_saved_is_loaded_to_the_last_bit(void **state)

@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: Apache-2.0
+// boothcal display: fit a panel's model, check it, run it both ways.
+#include <jansson.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "calibration/commands.h"
+#include "calibration/display_fit.h"
+#include "config/display_file.h"
+
+// ---- fit -------------------------------------------------------------------
+
+static void warn_misfit(const struct display_fit *f)
+{
+    fprintf(stderr,
+            "boothcal: warning: three curves and a matrix do not describe this panel: mean %.2f, 95th "
+            "percentile %.2f CIEDE2000", f->de00.mean, f->de00.p95);
+    if (f->primaries && fabs(f->additivity) > 0.02)
+        fprintf(stderr, ": its channels do not add (red, green and blue alone sum to %+.1f %% of white's "
+                        "luminance)", 100 * f->additivity);
+    else
+        fprintf(stderr, ": colours of the channels change along their ramps, or the readings are noisy");
+    fputc('\n', stderr);
+}
+
+static int warn(const struct measurements *m, const struct display_model *model,
+                const struct display_fit *f)
+{
+    if (f->misfit)
+        warn_misfit(f);
+    if (f->ill_conditioned)
+        fprintf(stderr, "boothcal: warning: primaries are much alike (condition number %.1f, sound below "
+                        "10): errors grow by that factor\n", model->condition);
+    if (f->drifted)
+        fprintf(stderr, "boothcal: warning: %s: white drifted by %.1f %% over %d readings (sound below "
+                        "3 %%): warm the panel up and measure again\n",
+                m->path, 100 * m->white_drift, m->whites);
+    if (!m->absolute)
+        fprintf(stderr, "boothcal: warning: %s: no LUMINANCE_XYZ_CDM2: white is taken as %.5g cd/m2\n",
+                m->path, m->white.Y);
+    return f->misfit || f->ill_conditioned || f->drifted || !m->absolute ? COMMAND_WARNED
+                                                                         : COMMAND_FINE;
+}
+
+static void print_fit(const struct measurements *m, const struct display_model *model,
+                      const struct display_fit *f)
+{
+    struct xyz black = display_black(model);
+    printf("%s: %d patches, CIEDE2000 mean %.3f, median %.3f, 95th percentile %.3f, largest %.3f\n",
+           m->path, f->patches, f->de00.mean, f->de00.median, f->de00.p95, f->de00.max);
+    printf("white %.5g cd/m2, black %.3g cd/m2, condition number %.2f, %d of %d curve nodes pooled\n",
+           m->white.Y, black.Y, model->condition, f->pooled, 3 * DISPLAY_NODES);
+}
+
+static struct display_origin origin_of(const struct measurements *m, const struct display_fit *f)
+{
+    struct display_origin o = {
+        .patches = f->patches, .fit_mean_de00 = f->de00.mean, .fit_max_de00 = f->de00.max};
+    snprintf(o.instrument, sizeof o.instrument, "%s", m->instrument);
+    snprintf(o.date, sizeof o.date, "%s", m->created);
+    snprintf(o.software, sizeof o.software, "boothcal %s", BOOTHD_VERSION);
+    snprintf(o.source, sizeof o.source, "%s", m->path);
+    return o;
+}
+
+static int fit_to(const char *out, const struct measurements *m)
+{
+    struct error err;
+    struct display_fit found;
+    struct display_model *model = malloc(sizeof *model);
+    int code = COMMAND_FAILED;
+    if (!model)
+        fprintf(stderr, "boothcal: out of memory\n");
+    else if (!display_fit(m, model, &found, &err))
+        code = command_bad_input(&err);
+    else {
+        struct display_origin origin = origin_of(m, &found);
+        if (!display_save(out, model, &origin, &err))
+            code = command_failed(&err);
+        else {
+            print_fit(m, model, &found);
+            code = warn(m, model, &found);
+        }
+    }
+    free(model);
+    return code;
+}
+
+static int command_fit(int argc, char **argv)
+{
+    const char *in = NULL;
+    const char *out = NULL;
+    for (int i = 1; i < argc; i++) {
+        if (!strcmp(argv[i], "-o") && i + 1 < argc)
+            out = argv[++i];
+        else if (argv[i][0] != '-' && !in)
+            in = argv[i];
+        else
+            in = out = "";
+    }
+    if (!in || !out || !*in || !*out)
+        return command_bad_usage("usage: boothcal display fit TRAIN.ti3 -o D.ini");
+    struct error err;
+    struct measurements m = {0};
+    if (!measurements_load(in, &m, &err))
+        return command_bad_input(&err);
+    int code = fit_to(out, &m);
+    measurements_fini(&m);
+    return code;
+}
+
+// ---- check -----------------------------------------------------------------
+
+static void print_check(const struct summary *s, bool json)
+{
+    if (!json) {
+        printf("%d patches, CIEDE2000 mean %.3f, median %.3f, 95th percentile %.3f, largest %.3f\n",
+               s->n, s->mean, s->median, s->p95, s->max);
+        return;
+    }
+    json_t *o = json_pack("{s:f, s:f, s:f, s:f, s:i}", "mean", s->mean, "median", s->median, "p95",
+                          s->p95, "max", s->max, "n", s->n);
+    json_dumpf(o, stdout, JSON_REAL_PRECISION(9));
+    putchar('\n');
+    json_decref(o);
+}
+
+static bool check(const char *model_path, const char *ti3, struct summary *s, struct error *err)
+{
+    struct measurements m = {0};
+    struct display_model *model = malloc(sizeof *model);
+    bool ok = model ? display_load(model_path, model, NULL, err) && measurements_load(ti3, &m, err)
+                    : fail(err, ERROR_SYSTEM, "out of memory");
+    double *de00 = ok ? malloc((size_t)m.count * sizeof *de00) : NULL;
+    if (ok && !de00)
+        ok = fail(err, ERROR_SYSTEM, "out of memory");
+    if (ok && (ok = display_differences(&m, model, de00, err)))
+        *s = summarise(de00, m.count);
+    free(de00);
+    free(model);
+    measurements_fini(&m);
+    return ok;
+}
+
+static int command_check(int argc, char **argv)
+{
+    const char *files[2] = {NULL, NULL};
+    bool json = false;
+    int count = 0;
+    for (int i = 1; i < argc; i++) {
+        if (!strcmp(argv[i], "--json"))
+            json = true;
+        else if (argv[i][0] != '-' && count < 2)
+            files[count++] = argv[i];
+        else
+            count = 3;
+    }
+    if (count != 2)
+        return command_bad_usage("usage: boothcal display check D.ini TEST.ti3 [--json]");
+    struct error err;
+    struct summary s;
+    if (!check(files[0], files[1], &s, &err))
+        return command_bad_input(&err);
+    print_check(&s, json);
+    return COMMAND_FINE;
+}
+
+// ---- forward, inverse ------------------------------------------------------
+
+static bool three_numbers(const char *line, double v[3], struct error *err)
+{
+    const char *gap = " \t,;\r\n";
+    const char *at = line + strspn(line, gap);
+    for (int i = 0; i < 3; i++) {
+        char *end;
+        int size = (int)strcspn(at, gap);
+        v[i] = strtod(at, &end);
+        if (!size)
+            return fail(err, ERROR_DATA, "%d number(s), not three", i);
+        if (end != at + size || !isfinite(v[i]))
+            return fail(err, ERROR_DATA, "\"%.*s\" is not a finite number", size > 40 ? 40 : size, at);
+        at = end + strspn(end, gap);
+    }
+    return !*at || fail(err, ERROR_DATA, "more than three numbers");
+}
+
+static bool one_forward(const struct display_model *model, const double v[3], struct error *err)
+{
+    for (int i = 0; i < 3; i++)
+        if (v[i] < 0 || v[i] > 100)
+            return fail(err, ERROR_RANGE, "RGB: %g is outside 0..100", v[i]);
+    struct xyz c = display_forward(model, (struct counts){v[0] / 100, v[1] / 100, v[2] / 100});
+    printf("%.10g %.10g %.10g\n", c.X, c.Y, c.Z);
+    return true;
+}
+
+static bool one_inverse(const struct display_model *model, const double v[3], struct error *err)
+{
+    (void)err;
+    struct display_inverse at = display_invert(model, (struct xyz){v[0], v[1], v[2]});
+    printf("%.10g %.10g %.10g%s\n", 100 * at.counts.r, 100 * at.counts.g, 100 * at.counts.b,
+           at.in_gamut ? "" : " out-of-gamut");
+    return true;
+}
+
+typedef bool one_line(const struct display_model *, const double v[3], struct error *);
+
+static bool all_lines(const struct display_model *model, one_line *one, struct error *err)
+{
+    char *line = NULL;
+    size_t room = 0;
+    bool ok = true;
+    for (int number = 1; ok && getline(&line, &room, stdin) >= 0; number++) {
+        double v[3];
+        if (line[strspn(line, " \t\r\n")] == 0 || *line == '#')
+            continue;
+        ok = (three_numbers(line, v, err) && one(model, v, err)) ||
+             while_doing(err, "stdin:%d", number);
+        fflush(stdout); // someone may wait at the other end of a pipe
+    }
+    free(line);
+    return ok;
+}
+
+static int run_lines(int argc, char **argv, one_line *one)
+{
+    if (argc != 2 || argv[1][0] == '-')
+        return command_bad_usage("usage: boothcal display %s D.ini <LINES", argv[0]);
+    struct error err;
+    struct display_model *model = malloc(sizeof *model);
+    if (!model) {
+        fail(&err, ERROR_SYSTEM, "out of memory");
+        return command_failed(&err);
+    }
+    bool ok = display_load(argv[1], model, NULL, &err) && all_lines(model, one, &err);
+    free(model);
+    return ok ? COMMAND_FINE : command_bad_input(&err);
+}
+
+static int command_forward(int argc, char **argv)
+{
+    return run_lines(argc, argv, one_forward);
+}
+
+static int command_inverse(int argc, char **argv)
+{
+    return run_lines(argc, argv, one_inverse);
+}
+
+int command_display(int argc, char **argv)
+{
+    static const struct command TABLE[] = {
+        {"fit", command_fit, "TRAIN.ti3 -o D.ini",
+         "Fits three curves and a 3x4 matrix to measured patches. Exit 3: done, with a warning\n"
+         "      (primaries much alike, the panel is no such model, white drifted, no absolute white)."},
+        {"check", command_check, "D.ini TEST.ti3 [--json]",
+         "CIEDE2000 of a model against measured patches: mean, median, p95, max, n."},
+        {"forward", command_forward, "D.ini",
+         "Reads \"R G B\" (0..100) a line, writes \"X Y Z\" in cd/m2 a line."},
+        {"inverse", command_inverse, "D.ini",
+         "Reads \"X Y Z\" in cd/m2 a line, writes \"R G B\" (0..100) a line; a fourth word\n"
+         "      \"out-of-gamut\" stands behind colours that had to be clipped."},
+        {NULL, NULL, NULL, NULL},
+    };
+    return command_run("boothcal display", TABLE, argc, argv);
+}
