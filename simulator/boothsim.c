@@ -273,7 +273,8 @@ static void forward_signal(struct booth *b, int64_t *kill_at_ns)
 static bool live(struct booth *b, int *status, struct error *err)
 {
     int64_t kill_at_ns = 0;
-    if (b->options->command && !child_start_command(b->options->command, b->display, &b->command, err))
+    if (b->options->command &&
+        !child_start_command(b->options->command, b->display, &b->command, err))
         return false;
     for (;;) {
         if (!control_serve(b->server, SERVE_MS, on_request, b, err))
@@ -313,7 +314,8 @@ static int run(const struct options *options)
         return EXIT_FAILURE;
     b->options = options;
     bool good = load_scenario(b, &err) &&
-                (b->world = world_create(&b->scenario, clock_now_ns(), &err)) && load_script(b, &err);
+                (b->world = world_create(&b->scenario, clock_now_ns(), &err)) &&
+                load_script(b, &err);
     if (good) {
         status = EXIT_FAILURE;
         catch_signals();

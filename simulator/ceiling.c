@@ -146,7 +146,8 @@ static double line_mean(const double *line, int count, double from, double to)
 
 static double area_mean(const struct ceiling_image *c, int width, int height, int column, int row)
 {
-    double left = (double)column * c->width / width, right = (double)(column + 1) * c->width / width;
+    double left = (double)column * c->width / width,
+           right = (double)(column + 1) * c->width / width;
     double top = (double)row * c->height / height, bottom = (double)(row + 1) * c->height / height;
     double sum = 0;
     for (int i = (int)top; i < c->height && i < bottom; i++) {

@@ -58,7 +58,8 @@ static bool sp_powers(const struct cgats *file, double *nm, double *power, size_
         !cgats_numbers(file, "SPECTRAL_START_NM", &start, 1, err) ||
         !cgats_numbers(file, "SPECTRAL_END_NM", &end, 1, err))
         return false;
-    if (cgats_keyword(file, "SPECTRAL_NORM") && !cgats_numbers(file, "SPECTRAL_NORM", &norm, 1, err))
+    if (cgats_keyword(file, "SPECTRAL_NORM") &&
+        !cgats_numbers(file, "SPECTRAL_NORM", &norm, 1, err))
         return false;
     size_t fields = 0;
     for (size_t c = 0; c < file->table.columns; c++)

@@ -9,7 +9,7 @@
 
 struct lamp {
     char name[SCENARIO_NAME_SIZE];
-    struct spectrum per_lux; // W m-2 nm-1 for 1 lx (W m-2 sr-1 nm-1 for 1 cd/m2)
+    struct spectrum per_lux;    // W m-2 nm-1 for 1 lx (W m-2 sr-1 nm-1 for 1 cd/m2)
     struct ceiling_image image; // cd/m2 at level 1, warm
     double warmup_drop, warmup_s;
 };

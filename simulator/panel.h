@@ -15,10 +15,10 @@ enum { PANEL_CODES_MOST = 1024 };
 
 struct panel {
     struct scenario_panel settings;
-    struct spectrum primary[3]; // R, G, B at full drive, W m-2 sr-1 nm-1
-    struct spectrum shift[3];   // what half drive adds to that, times 4
-    struct spectrum leak;       // at zero drive
-    struct spectrum coating;    // reflectance of the front surface
+    struct spectrum primary[3];        // R, G, B at full drive, W m-2 sr-1 nm-1
+    struct spectrum shift[3];          // what half drive adds to that, times 4
+    struct spectrum leak;              // at zero drive
+    struct spectrum coating;           // reflectance of the front surface
     double curve[3][PANEL_CODES_MOST]; // code -> linear light 0..1
     double wave[3][4];                 // non-uniformity: slopes and phases
 };

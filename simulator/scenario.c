@@ -7,21 +7,33 @@
 #include "files/ini.h"
 
 #define DOUBLE(f, lo, hi, unit, preset, help)                                                      \
-    {#f, SETTING_DOUBLE, offsetof(struct OWNER, f), 0, lo, hi, unit, NULL, preset, help}
+    {                                                                                              \
+#f, SETTING_DOUBLE, offsetof(struct OWNER, f), 0, lo, hi, unit, NULL, preset, help         \
+    }
 #define INT(f, lo, hi, unit, preset, help)                                                         \
-    {#f, SETTING_INT, offsetof(struct OWNER, f), 0, lo, hi, unit, NULL, preset, help}
+    {                                                                                              \
+#f, SETTING_INT, offsetof(struct OWNER, f), 0, lo, hi, unit, NULL, preset, help            \
+    }
 #define BOOL(f, preset, help)                                                                      \
-    {#f, SETTING_BOOL, offsetof(struct OWNER, f), 0, 0, 0, "", NULL, preset, help}
+    {                                                                                              \
+#f, SETTING_BOOL, offsetof(struct OWNER, f), 0, 0, 0, "", NULL, preset, help               \
+    }
 #define TEXT(f, preset, help)                                                                      \
-    {#f, SETTING_TEXT, offsetof(struct OWNER, f), SETTING_SIZE(struct OWNER, f), 0, 0, "", NULL,   \
-     preset, help}
+    {                                                                                              \
+#f, SETTING_TEXT, offsetof(struct OWNER, f), SETTING_SIZE(struct OWNER, f), 0, 0, "",      \
+            NULL, preset, help                                                                     \
+    }
 #define VECTOR(f, n, lo, hi, unit, preset, help)                                                   \
-    {#f, SETTING_VECTOR, offsetof(struct OWNER, f), n, lo, hi, unit, NULL, preset, help}
+    {                                                                                              \
+#f, SETTING_VECTOR, offsetof(struct OWNER, f), n, lo, hi, unit, NULL, preset, help         \
+    }
 
 // A pair of whole numbers: settings vectors are of doubles, so two rows.
 #define PIXELS(name, f, i, preset, help)                                                           \
-    {name, SETTING_INT, offsetof(struct OWNER, f) + (i) * sizeof(int), 0, 16, 4096, "px", NULL,    \
-     preset, help}
+    {                                                                                              \
+        name, SETTING_INT, offsetof(struct OWNER, f) + (i) * sizeof(int), 0, 16, 4096, "px", NULL, \
+            preset, help                                                                           \
+    }
 
 #define OWNER scenario_world
 static const struct setting world_rows[] = {

@@ -57,7 +57,8 @@ bool event_lamp(const struct scenario *scenario, const char *name, double level,
 
 bool event_tilt(double tilt_deg, double over_s, struct event *out, struct error *err)
 {
-    if (!within("tilt", tilt_deg, -90, 180, "deg", err) || !within("over", over_s, 0, 1e6, "s", err))
+    if (!within("tilt", tilt_deg, -90, 180, "deg", err) ||
+        !within("over", over_s, 0, 1e6, "s", err))
         return false;
     *out = (struct event){.kind = EVENT_TILT, .tilt_deg = tilt_deg, .over_s = over_s};
     return true;
@@ -65,7 +66,8 @@ bool event_tilt(double tilt_deg, double over_s, struct event *out, struct error 
 
 bool event_head(struct vec3 eye_m, double over_s, struct event *out, struct error *err)
 {
-    if (!within("head x", eye_m.x, -5, 5, "m", err) || !within("head y", eye_m.y, -5, 5, "m", err) ||
+    if (!within("head x", eye_m.x, -5, 5, "m", err) ||
+        !within("head y", eye_m.y, -5, 5, "m", err) ||
         !within("head z", eye_m.z, -5, 5, "m", err) || !within("over", over_s, 0, 1e6, "s", err))
         return false;
     *out = (struct event){.kind = EVENT_HEAD, .eye_m = eye_m, .over_s = over_s};

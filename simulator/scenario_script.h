@@ -32,13 +32,13 @@ struct aim {
 struct event {
     double at_s; // world seconds from the start, >= 0
     enum event_kind kind;
-    double over_s;           // TILT, HEAD: how long the movement takes, 0 = at once
-    int lamp;                // LAMP, ADD: index, -1 = none
-    double level;            // LAMP, ADD: 0..1.2
-    double tilt_deg;         // TILT: -90..180
-    struct vec3 eye_m;       // HEAD
-    struct aim aim;          // AIM
-    int instrument, fault;   // FAULT: enum wire_instrument, enum wire_fault
+    double over_s;         // TILT, HEAD: how long the movement takes, 0 = at once
+    int lamp;              // LAMP, ADD: index, -1 = none
+    double level;          // LAMP, ADD: 0..1.2
+    double tilt_deg;       // TILT: -90..180
+    struct vec3 eye_m;     // HEAD
+    struct aim aim;        // AIM
+    int instrument, fault; // FAULT: enum wire_instrument, enum wire_fault
 };
 
 // Each fills an event but its time, and refuses (RANGE, CONFIG) what the

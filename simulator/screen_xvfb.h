@@ -14,7 +14,7 @@
 struct xvfb_screen {
     int width, height;
     int bytes_per_pixel, bytes_per_line;
-    bool most_first; // byte order of a pixel
+    bool most_first;  // byte order of a pixel
     uint32_t mask[3]; // red, green, blue
     const unsigned char *pixels;
     void *map; // owned

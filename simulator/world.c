@@ -280,7 +280,8 @@ static double spot_illuminance(const struct world *w, const struct easel *easel,
 {
     const struct scenario_screen *screen = &w->scenario.screen;
     double r = w->scenario.radiometer.screen_spot_m / 2 * M_SQRT1_2, sum = 0;
-    double dx = r / screen->width_m * screen->width_px, dy = r / screen->height_m * screen->height_px;
+    double dx = r / screen->width_m * screen->width_px,
+           dy = r / screen->height_m * screen->height_px;
     const double around[4][2] = {{dx, 0}, {-dx, 0}, {0, dy}, {0, -dy}};
     for (int i = 0; i < 4; i++) {
         struct vec3 p = easel_point(easel, screen, x_px + around[i][0], y_px + around[i][1]);

@@ -15,8 +15,9 @@ static struct ceiling_image uniform(double width_m, double depth_m, double heigh
                                     int height, double luminance)
 {
     struct ceiling_image image = {
-        {0, height_m, 0}, width_m, depth_m, width, height,
-        malloc(sizeof *image.luminance * (size_t)width * (size_t)height)};
+        {0, height_m, 0}, width_m,
+        depth_m,          width,
+        height,           malloc(sizeof *image.luminance * (size_t)width * (size_t)height)};
     for (int i = 0; i < width * height; i++)
         image.luminance[i] = luminance;
     return image;
@@ -90,7 +91,8 @@ static void nothing_above_the_ceiling_is_lit(void **state)
     (void)state;
     struct ceiling_image image = uniform(1, 1, 0.5, 10, 10, 1000);
     assert_true(ceiling_illuminance(&image, (struct vec3){0, 0.5, 0}, up) == 0);
-    assert_true(ceiling_illuminance(&image, (struct vec3){0, 0.6, 0}, (struct vec3){0, -1, 0}) == 0);
+    assert_true(ceiling_illuminance(&image, (struct vec3){0, 0.6, 0}, (struct vec3){0, -1, 0}) ==
+                0);
     ceiling_fini(&image);
 }
 

@@ -5,12 +5,12 @@
 #include "simulator/chance.h"
 #include "tests/simulator/cmocka_here.h"
 
-#define SETTLED 1e-9       // relative: white and black are scaled to what was asked
-#define D65_XY 1e-4        // the white point as CIE 15 rounds it
-#define P3_XY 0.02         // "P3-like": beyond this another gamut's name would fit better
-#define ANGLE 0.005        // the published figures have two digits
-#define ADDITIVE 1e-9      // relative: with nothing to disturb them channels add up
-#define FLARE 0.02         // relative: the coating is not quite neutral
+#define SETTLED 1e-9  // relative: white and black are scaled to what was asked
+#define D65_XY 1e-4   // the white point as CIE 15 rounds it
+#define P3_XY 0.02    // "P3-like": beyond this another gamut's name would fit better
+#define ANGLE 0.005   // the published figures have two digits
+#define ADDITIVE 1e-9 // relative: with nothing to disturb them channels add up
+#define FLARE 0.02    // relative: the coating is not quite neutral
 #define ONE_GREY_LEVEL 1e-12
 
 static struct panel panel;
@@ -126,8 +126,10 @@ static double error_of_adding_up(int count)
     struct chance chance = chance_start(11, "patches", 0);
     double sum = 0;
     for (int i = 0; i < count; i++) {
-        double r = chance_uniform(&chance), g = chance_uniform(&chance), b = chance_uniform(&chance);
-        struct xyz seen = patch(r, g, b), x = patch(r, 0, 0), y = patch(0, g, 0), z = patch(0, 0, b);
+        double r = chance_uniform(&chance), g = chance_uniform(&chance),
+               b = chance_uniform(&chance);
+        struct xyz seen = patch(r, g, b), x = patch(r, 0, 0), y = patch(0, g, 0),
+                   z = patch(0, 0, b);
         struct xyz added = {x.X + y.X + z.X - 2 * black.X, x.Y + y.Y + z.Y - 2 * black.Y,
                             x.Z + y.Z + z.Z - 2 * black.Z};
         struct lab one, other;

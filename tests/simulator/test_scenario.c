@@ -194,13 +194,13 @@ static void a_bad_script_is_refused_by_line(void **state)
 {
     (void)state;
     static const char *const bad[][2] = {
-        {"soon lamp A", "soon"},        {"-1 lamp A", "time"},
-        {"1 lamp B", "not one of"},     {"1 lamp A 1.3", "level"},
-        {"1 lamp A nan", "nan"},        {"1 add A", "level is missing"},
-        {"1 tilt", "tilt is missing"},  {"1 tilt 200", "outside"},
-        {"1 tilt 20 in 3", "too many"}, {"1 head 1 2", "head is missing"},
-        {"1 aim wall 1 2", "neither"},  {"1 aim screen 1280 0", "outside"},
-        {"1 aim ceiling 2 0", "aim x"}, {"1 fault camera tired", "fine, unplugged"},
+        {"soon lamp A", "soon"},         {"-1 lamp A", "time"},
+        {"1 lamp B", "not one of"},      {"1 lamp A 1.3", "level"},
+        {"1 lamp A nan", "nan"},         {"1 add A", "level is missing"},
+        {"1 tilt", "tilt is missing"},   {"1 tilt 200", "outside"},
+        {"1 tilt 20 in 3", "too many"},  {"1 head 1 2", "head is missing"},
+        {"1 aim wall 1 2", "neither"},   {"1 aim screen 1280 0", "outside"},
+        {"1 aim ceiling 2 0", "aim x"},  {"1 fault camera tired", "fine, unplugged"},
         {"1 fault mouse fine", "mouse"}, {"1 dance", "\"dance\" is not"},
         {"1", "what happens"},
     };

@@ -45,24 +45,17 @@ static const struct picture deep24 = {
 static unsigned char *picture_begin(const struct picture *p)
 {
     unsigned char *bytes = calloc(1, p->size + 1);
-    const uint32_t words[25] = {[0] = p->header_size,
-                                [1] = 7,
-                                [2] = 2,
-                                [4] = p->width,
-                                [5] = p->height,
-                                [7] = p->most_first,
-                                [11] = p->bits,
-                                [12] = p->line,
-                                [14] = p->mask[0],
-                                [15] = p->mask[1],
-                                [16] = p->mask[2],
-                                [19] = p->colours};
+    const uint32_t words[25] = {[0] = p->header_size, [1] = 7,           [2] = 2,
+                                [4] = p->width,       [5] = p->height,   [7] = p->most_first,
+                                [11] = p->bits,       [12] = p->line,    [14] = p->mask[0],
+                                [15] = p->mask[1],    [16] = p->mask[2], [19] = p->colours};
     for (uint32_t i = 0; i < 100 && i < p->size; i++)
         bytes[i] = (unsigned char)(words[i / 4] >> (24 - 8 * (i % 4)));
     return bytes;
 }
 
-static unsigned char *pixel_of(const struct picture *p, unsigned char *bytes, uint32_t x, uint32_t y)
+static unsigned char *pixel_of(const struct picture *p, unsigned char *bytes, uint32_t x,
+                               uint32_t y)
 {
     return bytes + p->header_size + 12 * p->colours + y * p->line + x * p->bits / 8;
 }
@@ -280,7 +273,8 @@ static void an_x_server_that_cannot_start_is_reported_with_its_log(void **state)
     struct error err = {0};
     int display = -1;
     scenario_preset(&s);
-    assert_false(child_start_xvfb(&s, "/nowhere", clock_now_ns() + NS_PER_S, &xvfb, &display, &err));
+    assert_false(
+        child_start_xvfb(&s, "/nowhere", clock_now_ns() + NS_PER_S, &xvfb, &display, &err));
     assert_non_null(strstr(err.text, "/nowhere/xvfb.log"));
     assert_int_equal(display, -1);
 }

@@ -12,7 +12,7 @@
 #define FLARE 0.02       // relative: the coating is not quite neutral
 #define SPOT_LEVEL 0.002 // relative: the panel is not uniform over the spot
 #define DITHER 0.01      // relative: a 49 pixel disc does not hold exactly half of each
-#define WARMED 1e-6       // relative: fifteen time constants leave e^-15 of the drop
+#define WARMED 1e-6      // relative: fifteen time constants leave e^-15 of the drop
 #define CAST 1e-6        // m: places and angles are far above it
 
 static const int64_t start_ns = 1000 * NS_PER_S;
@@ -137,8 +137,8 @@ static void a_tabled_flat_reflectance_is_a_flat_reflectance(void **state)
 {
     (void)state;
     double flat = truth_number(0, "{\"reflectance\": 0.25}", "Y");
-    double tabled = truth_number(
-        0, "{\"reflectance\": {\"nm\": [380, 780], \"values\": [0.25, 0.25]}}", "Y");
+    double tabled =
+        truth_number(0, "{\"reflectance\": {\"nm\": [380, 780], \"values\": [0.25, 0.25]}}", "Y");
     assert_near(tabled, flat, EXACT * flat);
 }
 
