@@ -42,13 +42,22 @@ static void name_one(struct spectra *s, size_t i, const char *name)
         snprintf(s->names[i], sizeof s->names[i], "%zu", i + 1);
 }
 
+// The noise of a reading about zero: so much of its peak a power may lie below.
+static double least_power(const double *values, size_t count)
+{
+    double peak = 0;
+    for (size_t i = 0; i < count; i++)
+        peak = fmax(peak, values[i]);
+    return -NOISE_MOST * peak;
+}
+
 // What a value may be: a lamp's power is not negative, a surface is no per cent.
 static bool check_value(const char *path, int line, const char *name, double nm, double value,
-                        bool held, struct error *err)
+                        double least, bool held, struct error *err)
 {
-    if (!held && value < 0)
-        return fail(err, ERROR_DATA, "%s:%d: %s: power %g at %g nm; it must be 0 or more", path,
-                    line, name, value, nm);
+    if (!held && value < least)
+        return fail(err, ERROR_DATA, "%s:%d: %s: power %g at %g nm; it must be %g or more", path,
+                    line, name, value, nm, least);
     if (held && (value > SURFACE_MOST || value < SURFACE_LEAST))
         return fail(err, ERROR_DATA,
                     "%s:%d: %s: reflectance %g at %g nm; it must lie in 0..1 (is it per cent?)",
@@ -81,9 +90,12 @@ static bool csv_column(const struct table *t, size_t column, bool held, double *
     for (size_t i = 0; i < t->rows; i++) {
         nm[i] = table_at(t, i, 0);
         values[i] = table_at(t, i, column);
-        if (!check_value(t->path, t->lines[i], out->names[column - 1], nm[i], values[i], held, err))
-            return false;
     }
+    double least = least_power(values, t->rows);
+    for (size_t i = 0; i < t->rows; i++)
+        if (!check_value(t->path, t->lines[i], out->names[column - 1], nm[i], values[i], least, held,
+                         err))
+            return false;
     if (!spectrum_from_samples(nm, values, t->rows, held, &out->spectra[column - 1], err))
         return while_doing(err, "%s", t->path);
     return true;
@@ -184,11 +196,13 @@ static bool cgats_row(const struct table *t, size_t row, const struct fields *f,
 {
     double *values = f->nm + f->count;
     name_one(out, row, t->labels ? t->labels[row] : NULL);
-    for (size_t i = 0; i < f->count; i++) {
+    for (size_t i = 0; i < f->count; i++)
         values[i] = table_at(t, row, f->columns[i]) / f->norm;
-        if (!check_value(t->path, t->lines[row], out->names[row], f->nm[i], values[i], held, err))
+    double least = least_power(values, f->count);
+    for (size_t i = 0; i < f->count; i++)
+        if (!check_value(t->path, t->lines[row], out->names[row], f->nm[i], values[i], least, held,
+                         err))
             return false;
-    }
     if (!spectrum_from_samples(f->nm, values, f->count, held, &out->spectra[row], err))
         return while_doing(err, "%s:%d", t->path, t->lines[row]);
     return true;
