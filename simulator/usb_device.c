@@ -24,6 +24,7 @@ struct urb {
     uint8_t type, endpoint;
     size_t length, actual;
     int status;
+    uint8_t *received; // copied to buffer when reaped: until then umockdev may be reading that
 };
 
 struct urbs {
@@ -64,6 +65,7 @@ static void drop(struct urb *urb)
 {
     g_clear_object(&urb->buffer);
     g_clear_object(&urb->data);
+    free(urb->received);
 }
 
 static void finish(struct usb_device *d, int at, int status)
@@ -144,7 +146,7 @@ static int transfer_in(struct usb_device *d, struct urb *urb, int64_t now_ns, in
         bool overflow = (size_t)size > room;
         size_t count = overflow ? room : (size_t)size;
         if (count)
-            memcpy(urb->buffer->data + urb->actual, packet, count);
+            memcpy(urb->received + urb->actual, packet, count);
         urb->actual += count;
         if (overflow)
             return -EOVERFLOW;
@@ -183,7 +185,8 @@ static size_t string_descriptor(const struct usb_device *d, int index, uint8_t *
 
 static int transfer_control(struct usb_device *d, struct urb *urb)
 {
-    uint8_t *setup = urb->buffer ? urb->buffer->data : NULL, text[256];
+    const uint8_t *setup = urb->buffer ? urb->buffer->data : NULL;
+    uint8_t text[256];
     if (!setup || urb->length < SETUP_SIZE || setup[0] != 0x80 || setup[1] != 6)
         return -EPIPE;
     const uint8_t *from = NULL;
@@ -199,7 +202,7 @@ static int transfer_control(struct usb_device *d, struct urb *urb)
         return -EPIPE;
     size = size < wanted ? size : wanted;
     size = size < urb->length - SETUP_SIZE ? size : urb->length - SETUP_SIZE;
-    memcpy(setup + SETUP_SIZE, from, size);
+    memcpy(urb->received, from, size);
     urb->actual = size;
     return 0;
 }
@@ -266,7 +269,8 @@ static int submit(struct usb_device *d, UMockdevIoctlClient *client, UMockdevIoc
     if (urb.length)
         urb.buffer = umockdev_ioctl_data_resolve(
             urb.data, offsetof(struct usbdevfs_urb, buffer), urb.length, NULL);
-    if (urb.length && !urb.buffer) {
+    urb.received = malloc(urb.length + 1);
+    if ((urb.length && !urb.buffer) || !urb.received) {
         drop(&urb);
         return -EFAULT;
     }
@@ -288,6 +292,9 @@ static int reap(struct usb_device *d, UMockdevIoctlClient *client, UMockdevIoctl
     struct usbdevfs_urb *u = (struct usbdevfs_urb *)(void *)urb.data->data;
     u->status = urb.status;
     u->actual_length = (int)urb.actual;
+    size_t before = urb.type == USBDEVFS_URB_TYPE_CONTROL ? SETUP_SIZE : 0;
+    if (urb.actual && (before || urb.endpoint & 0x80))
+        memcpy(urb.buffer->data + before, urb.received, urb.actual);
     umockdev_ioctl_data_set_ptr(pointer, 0, urb.data);
     drop(&urb);
     g_object_unref(pointer);
