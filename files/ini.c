@@ -113,16 +113,19 @@ static int on_setting(void *user, const char *section, const char *key, const ch
 static bool check_line(struct reading *r, const char *at, const char *end, bool *begun)
 {
     char shown[TEXT_SHOWN];
+    end -= end > at && end[-1] == '\r';
     size_t size = end - at, bad = text_utf8_end(at, size);
+    const char *stray = memchr(at, '\r', size);
+    bad = stray && (size_t)(stray - at) < bad ? (size_t)(stray - at) : bad;
     if (bad < size)
-        return fail(r->err, ERROR_CONFIG, "byte 0x%02x is not UTF-8 text", (unsigned char)at[bad]);
+        return fail(r->err, ERROR_CONFIG, "byte 0x%02x is not text", (unsigned char)at[bad]);
     if (size > LINE_MOST)
         return fail(r->err, ERROR_CONFIG, "line is longer than %d bytes", LINE_MOST);
     at += strspn(at, " \t");
     const char *close = at < end && *at == '[' ? memchr(at, ']', end - at) : NULL;
     if (!close)
         return true;
-    if (close + 1 + strspn(close + 1, " \t\r") < end)
+    if (close + 1 + strspn(close + 1, " \t") < end)
         return fail(r->err, ERROR_CONFIG, "text after [section]; allowed: nothing");
     size_t first, length = close - at - 1;
     const struct settings_section *section = find_section(r->sections, at + 1, length, &first);

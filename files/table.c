@@ -36,7 +36,7 @@ struct csv {
     const char *at, *stop;  // of the line
     int line;
     char separator;
-    size_t cells_room, rows_room;
+    size_t names_room, rows_room;
 };
 
 struct cell {
@@ -149,10 +149,14 @@ static bool add_name(struct csv *csv, struct cell cell, struct error *err)
     if (text_utf8_end(cell.text, cell.size) < cell.size)
         return fail(err, ERROR_DATA, "%s:%d: column %zu: name \"%s\" is not UTF-8 text", t->path,
                     csv->line, t->columns + 1, text_shown(shown, cell.text, cell.size));
-    char **more = realloc(t->names, (t->columns + 1) * sizeof *more);
-    if (!more)
-        return out_of_memory(csv, err);
-    t->names = more;
+    if (t->columns == csv->names_room) {
+        size_t room = 2 * csv->names_room + 8;
+        char **more = realloc(t->names, room * sizeof *more);
+        if (!more)
+            return out_of_memory(csv, err);
+        t->names = more;
+        csv->names_room = room;
+    }
     if (!(t->names[t->columns] = strndup(cell.text, cell.size)))
         return out_of_memory(csv, err);
     t->columns++;
