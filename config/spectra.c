@@ -12,7 +12,8 @@
 #include "files/table.h"
 
 #define FIELD_SLACK_NM 0.51 // field names carry whole nanometres
-#define SURFACE_LEAST -0.1 // noise of an instrument
+#define LAMP_NOISE 0.05     // of its peak: an instrument's noise where it sees badly
+#define SURFACE_LEAST -0.1  // likewise
 #define SURFACE_MOST 2.0    // beyond it a "reflectance" is per cent or counts
 
 enum { FIELDS_LEAST = 2 };
@@ -42,27 +43,46 @@ static void name_one(struct spectra *s, size_t i, const char *name)
         snprintf(s->names[i], sizeof s->names[i], "%zu", i + 1);
 }
 
-// The noise of a reading about zero: so much of its peak a power may lie below.
-static double least_power(const double *values, size_t count)
+// One spectrum as read; of_line[i * line_step] is the line of sample i.
+struct samples {
+    const char *path, *name;
+    const double *nm, *values;
+    size_t count, line_step;
+    const int *of_line;
+};
+
+static bool bad_value(const struct samples *s, size_t i, const char *must, struct error *err)
 {
-    double peak = 0;
-    for (size_t i = 0; i < count; i++)
-        peak = fmax(peak, values[i]);
-    return -NOISE_MOST * peak;
+    return fail(err, ERROR_DATA, "%s:%d: %s: %g at %g nm; %s", s->path,
+                s->of_line[i * s->line_step], s->name, s->values[i], s->nm[i], must);
 }
 
-// What a value may be: a lamp's power is not negative, a surface is no per cent.
-static bool check_value(const char *path, int line, const char *name, double nm, double value,
-                        double least, bool held, struct error *err)
+// What a value may be: a lamp's power is not negative but for noise, a surface
+// is no per cent. What lies outside the grid is not looked at.
+static bool check_values(const struct samples *s, bool held, struct error *err)
 {
-    if (!held && value < least)
-        return fail(err, ERROR_DATA, "%s:%d: %s: power %g at %g nm; it must be %g or more", path,
-                    line, name, value, nm, least);
-    if (held && (value > SURFACE_MOST || value < SURFACE_LEAST))
-        return fail(err, ERROR_DATA,
-                    "%s:%d: %s: reflectance %g at %g nm; it must lie in 0..1 (is it per cent?)",
-                    path, line, name, value, nm);
+    double peak = 0;
+    for (size_t i = 0; i < s->count; i++)
+        peak = fmax(peak, s->values[i]);
+    for (size_t i = 0; i < s->count; i++) {
+        double v = s->values[i];
+        if (s->nm[i] < SPECTRUM_FIRST_NM || s->nm[i] > SPECTRUM_LAST_NM)
+            continue;
+        if (!held && v < -LAMP_NOISE * peak)
+            return bad_value(s, i, "a lamp's power must be 0 or more", err);
+        if (held && (v > SURFACE_MOST || v < SURFACE_LEAST))
+            return bad_value(s, i, "a reflectance must lie in 0..1 (is it per cent?)", err);
+    }
     return true;
+}
+
+static bool take_samples(const struct samples *s, bool held, struct spectrum *out,
+                         struct error *err)
+{
+    if (!check_values(s, held, err))
+        return false;
+    return spectrum_from_samples(s->nm, s->values, s->count, held, out, err) ||
+           while_doing(err, "%s:%d: %s", s->path, s->of_line[0], s->name);
 }
 
 // ---- CSV: wavelengths down, one spectrum a column ----------------------------
@@ -91,14 +111,8 @@ static bool csv_column(const struct table *t, size_t column, bool held, double *
         nm[i] = table_at(t, i, 0);
         values[i] = table_at(t, i, column);
     }
-    double least = least_power(values, t->rows);
-    for (size_t i = 0; i < t->rows; i++)
-        if (!check_value(t->path, t->lines[i], out->names[column - 1], nm[i], values[i], least, held,
-                         err))
-            return false;
-    if (!spectrum_from_samples(nm, values, t->rows, held, &out->spectra[column - 1], err))
-        return while_doing(err, "%s", t->path);
-    return true;
+    struct samples s = {t->path, out->names[column - 1], nm, values, t->rows, 1, t->lines};
+    return take_samples(&s, held, &out->spectra[column - 1], err);
 }
 
 static bool from_csv(const struct table *t, bool held, struct spectra *out, struct error *err)
@@ -198,14 +212,8 @@ static bool cgats_row(const struct table *t, size_t row, const struct fields *f,
     name_one(out, row, t->labels ? t->labels[row] : NULL);
     for (size_t i = 0; i < f->count; i++)
         values[i] = table_at(t, row, f->columns[i]) / f->norm;
-    double least = least_power(values, f->count);
-    for (size_t i = 0; i < f->count; i++)
-        if (!check_value(t->path, t->lines[row], out->names[row], f->nm[i], values[i], least, held,
-                         err))
-            return false;
-    if (!spectrum_from_samples(f->nm, values, f->count, held, &out->spectra[row], err))
-        return while_doing(err, "%s:%d", t->path, t->lines[row]);
-    return true;
+    struct samples s = {t->path, out->names[row], f->nm, values, f->count, 0, &t->lines[row]};
+    return take_samples(&s, held, &out->spectra[row], err);
 }
 
 static bool from_cgats(const struct cgats *file, bool held, struct spectra *out, struct error *err)

@@ -17,8 +17,8 @@ void spectra_fini(struct spectra *s);
 // reflectances). A .sp whose SPECTRAL_BANDS, SPECTRAL_START_NM,
 // SPECTRAL_END_NM or SPECTRAL_NORM contradicts its SPEC_ fields is refused,
 // naming file, line, key, value and what the fields say; so are negative
-// lamp powers, unsorted or repeated wavelengths and wrong units (a range that
-// misses 400..700 nm).
+// lamp powers (beyond noise: 5 % of the peak), unsorted or repeated wavelengths
+// and wrong units (a range that misses 400..700 nm, reflectances in per cent).
 bool spectra_load(const char *path, bool held, struct spectra *out, struct error *err);
 
 // Whether a text means a file: it has a '/' or ends in .csv or .sp.

@@ -97,6 +97,14 @@ static void csv_with_and_without_names_is_read(void **state)
     spectra_fini(&s);
 }
 
+static void noise_of_an_instrument_is_kept(void **state)
+{
+    (void)state;
+    struct spectra s = load("noisy.csv", "300,-9\n365,-.1\n400,1\n550,3\n700,1\n850,-9\n", false);
+    assert_near(at(&s, 0, 365), -0.1, ROUNDING);
+    spectra_fini(&s);
+}
+
 static void csv_that_makes_no_sense_is_refused(void **state)
 {
     (void)state;
@@ -282,6 +290,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(csv_with_and_without_names_is_read),
+        cmocka_unit_test(noise_of_an_instrument_is_kept),
         cmocka_unit_test(csv_that_makes_no_sense_is_refused),
         cmocka_unit_test(sp_is_read_and_divided_by_its_norm),
         cmocka_unit_test(sp_carries_several_named_spectra),
