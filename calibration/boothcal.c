@@ -7,6 +7,9 @@
 
 static const struct command FAMILIES[] = {
     {"colour", command_colour, "deltae|spectrum", "colour differences; colours of spectra"},
+    {"display", command_display, "fit|check|forward|inverse", "the display model of a panel"},
+    {"bands", command_bands, "optimise|check", "the bands that carry reflectances"},
+    {"session", command_session, "--config FILE --maps FOLDER -o FOLDER", "from bare settings to an accuracy report"},
     {NULL, NULL, NULL, NULL},
 };
 
