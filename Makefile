@@ -83,11 +83,11 @@ $(BUILD)/render/shaders_embedded.inc: $(SHADERS)
 	@mkdir -p $(@D)
 	for f in $^; do printf '{"%s",\n' $$(basename $$f); sed -e 's/\\/\\\\/g; s/"/\\"/g; s/^/"/; s/$$/\\n"/' $$f; echo '},'; done > $@
 
-# What names the version is made again when the version changes.
-$(call object,$(shell grep -l -r --include='*.c' BOOTHD_VERSION $(FOLDERS))): $(BUILD)/version
+# What names the version or the place it is installed in is made again when that changes.
+$(call object,$(shell grep -l -r --include='*.c' 'BOOTHD_VERSION\|BOOTHD_DATADIR' $(FOLDERS))): $(BUILD)/version
 $(BUILD)/version: FORCE
 	@mkdir -p $(@D)
-	@echo '$(VERSION)' | cmp -s - $@ || echo '$(VERSION)' > $@
+	@echo '$(VERSION) $(PREFIX)' | cmp -s - $@ || echo '$(VERSION) $(PREFIX)' > $@
 FORCE:
 
 define folder_rule
@@ -133,8 +133,58 @@ demo:
 	$(MAKE) all
 	BUILD=$(BUILD) calibration/demo.sh $(BUILD)/demo
 
+bench: $(BUILD)/tests/bench/bench
+	$< $(BUILD)/bench.json
+
+$(BUILD)/tests/bench/bench: $(BUILD)/tests/bench/bench.o $(call archives,calibration $(call below,calibration))
+	$(call say,LD $@)$(CC) -o $@ $< $(call libs,calibration $(call below,calibration))
+
 format:
 	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')
+
+# What is installed: source, place below PREFIX, mode. Uninstall reads the same list.
+MADE      := $(BUILD)/made/boothd.conf $(BUILD)/made/70-boothd.rules $(BUILD)/made/boothd.service $(BUILD)/made/boothd.conf.5
+INSTALLED := $(foreach p,$(PROGRAMS),$(BUILD)/$(p)=bin/$(p)=755) \
+  $(foreach d,materials booths,$(foreach f,$(wildcard config/$(d)/*),$(f)=share/boothd/$(d)/$(notdir $(f))=644)) \
+  $(foreach f,$(wildcard simulator/scenarios/*),$(f)=share/boothd/scenarios/$(notdir $(f))=644) \
+  $(foreach f,$(wildcard man/*.1),$(f)=share/man/man1/$(notdir $(f))=644) \
+  man/boothd.8=share/man/man8/boothd.8=644 \
+  $(BUILD)/made/boothd.conf.5=share/man/man5/boothd.conf.5=644 \
+  $(BUILD)/made/boothd.conf=share/boothd/boothd.conf=644 \
+  $(BUILD)/made/boothd.service=lib/systemd/user/boothd.service=644 \
+  $(BUILD)/made/70-boothd.rules=lib/udev/rules.d/70-boothd.rules=644 \
+  systemd/boothd.sysusers=lib/sysusers.d/boothd.conf=644 \
+  systemd/boothd.tmpfiles=lib/tmpfiles.d/boothd.conf=644 \
+  README.md=share/doc/boothd/README.md=644 LICENSE=share/doc/boothd/LICENSE=644
+
+$(BUILD)/made/boothd.conf: $(BUILD)/boothd
+	@mkdir -p $(@D)
+	$< --describe >$@
+
+$(BUILD)/made/70-boothd.rules: $(BUILD)/boothd
+	@mkdir -p $(@D)
+	$< --udev >$@
+
+$(BUILD)/made/boothd.conf.5: man/boothd.conf.5.in $(BUILD)/boothd
+	@mkdir -p $(@D)
+	$(BUILD)/boothd --describe-man >$@.settings
+	sed -e '/@settings@/{r $@.settings' -e 'd' -e '}' $< >$@
+	@rm $@.settings
+
+$(BUILD)/made/boothd.service: systemd/boothd.service $(BUILD)/version
+	@mkdir -p $(@D)
+	sed 's|@bindir@|$(PREFIX)/bin|' $< >$@
+
+install: all $(MADE)
+	@for i in $(INSTALLED); do \
+	    from=$${i%%=*}; mode=$${i##*=}; to=$${i#*=}; to=$${to%=*}; \
+	    install -D -m $$mode "$$from" "$(DESTDIR)$(PREFIX)/$$to" || exit 1; done
+	@echo "installed in $(DESTDIR)$(PREFIX); then, as root: systemd-sysusers, systemd-tmpfiles --create, udevadm control --reload"
+
+uninstall:
+	@for i in $(INSTALLED); do to=$${i#*=}; rm -f "$(DESTDIR)$(PREFIX)/$${to%=*}"; done
+	@for d in share/boothd/materials share/boothd/booths share/boothd/scenarios share/boothd share/doc/boothd; do \
+	    [ ! -d "$(DESTDIR)$(PREFIX)/$$d" ] || rmdir --ignore-fail-on-non-empty "$(DESTDIR)$(PREFIX)/$$d"; done
 
 clean:
 	rm -rf build
