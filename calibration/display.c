@@ -21,6 +21,8 @@ static void warn_misfit(const struct display_fit *f)
     if (f->primaries && fabs(f->additivity) > 0.02)
         fprintf(stderr, ": its channels do not add (red, green and blue alone sum to %+.1f %% of white's "
                         "luminance)", 100 * f->additivity);
+    else if (f->drifted)
+        fprintf(stderr, ": it changed while it was measured");
     else
         fprintf(stderr, ": colours of the channels change along their ramps, or the readings are noisy");
     fputc('\n', stderr);
