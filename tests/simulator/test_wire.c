@@ -9,6 +9,7 @@
 #include <modbus.h>
 #include <poll.h>
 #include <setjmp.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -336,6 +337,47 @@ static void another_process_reads_a_spectrum(void **state)
     assert_int_equal(waitpid(child, &status, 0), child);
     assert_true(WIFEXITED(status));
     assert_int_equal(WEXITSTATUS(status), 0);
+}
+
+// Waits for a spectrum nobody asked for, to be killed meanwhile.
+static int as_victim(void)
+{
+    libusb_context *usb;
+    unsigned char bytes[4608];
+    int size;
+    if (libusb_init(&usb) != 0)
+        return 1;
+    libusb_device_handle *handle = libusb_open_device_with_vid_pid(usb, OCEAN_VENDOR, USB2000PLUS);
+    if (!handle || libusb_claim_interface(handle, 0) != 0 || command(handle, "\xFE", 1) != 0)
+        return 2;
+    if (write(STDOUT_FILENO, "x", 1) != 1)
+        return 3;
+    return libusb_bulk_transfer(handle, SPECTRA, bytes, sizeof(bytes), &size, 0);
+}
+
+static void a_program_killed_in_mid_transfer_does_no_harm(void **state)
+{
+    (void)state;
+    int ends[2];
+    char byte;
+    assert_int_equal(pipe(ends), 0);
+    pid_t child = fork();
+    if (child == 0) {
+        dup2(ends[1], STDOUT_FILENO);
+        execl(own_path, own_path, "--victim", (char *)NULL);
+        _exit(127);
+    }
+    close(ends[1]);
+    assert_int_equal(read(ends[0], &byte, 1), 1);
+    kill(child, SIGKILL);
+    assert_int_equal(waitpid(child, NULL, 0), child);
+    close(ends[0]);
+    struct opened o = open_usb();
+    unsigned char left_over[64];
+    int size;
+    libusb_bulk_transfer(o.handle, REPLIES, left_over, sizeof(left_over), &size, REPLY_MS);
+    expect_good_spectrum(&o);
+    close_usb(&o);
 }
 
 // ---- camera ---------------------------------------------------------------------
@@ -676,7 +718,7 @@ int main(int argc, char **argv)
 {
     own_path = argv[0];
     if (argc > 1)
-        return as_child();
+        return strcmp(argv[1], "--victim") == 0 ? as_victim() : as_child();
     const char *preload = getenv("LD_PRELOAD");
     if (!preload || !strstr(preload, "umockdev")) {
         setenv("ASAN_OPTIONS", "verify_asan_link_order=0", 0); // the wrapper preloads before it
@@ -693,6 +735,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(garbage_and_short_spectra_show_as_such),
         cmocka_unit_test(pulled_in_mid_transfer_and_plugged_again_ten_times),
         cmocka_unit_test(another_process_reads_a_spectrum),
+        cmocka_unit_test(a_program_killed_in_mid_transfer_does_no_harm),
         cmocka_unit_test(the_camera_shows_points_through_hidapi),
         cmocka_unit_test(the_camera_names_itself),
         cmocka_unit_test(the_camera_s_faults_show),
