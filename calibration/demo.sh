@@ -26,7 +26,7 @@ if [ "$1" = --inside ]; then
     "$programs/boothd" --config "$run/boothd.conf" 2>"$out/boothd.log" &
     daemon=$!
     tries=0
-    until "$programs/boothctl" --socket "$run/boothd.sock" status >/dev/null 2>&1; do
+    until "$programs/boothctl" --socket "$run/boothd.sock" --json status >/dev/null 2>&1 || [ $? = 3 ]; do
         tries=$((tries + 1))
         if [ $tries -gt 100 ] || ! kill -0 "$daemon" 2>/dev/null; then
             echo "demo: boothd did not start; its log:" >&2
