@@ -18,7 +18,8 @@ static const char DATA_FOLDER[] =
 
 static const char TABLE_HEAD[] =
     "// SPDX-License-Identifier: Apache-2.0\n"
-    "// Written by: boothcal bands optimise --basis reflectance_basis.c -o bands.c\n";
+    "// Written by: boothcal bands optimise --basis reflectance_basis.c -o bands.c\n"
+    "// clang-format off\n";
 
 // ---- optimise --------------------------------------------------------------
 
@@ -75,7 +76,8 @@ static bool write_basis(const char *path, const struct derived *d, struct error 
           "// (Vrhel, Krinov, Koivisto), as Debian's psychtoolbox-3-common carries them: their\n"
           "// leading singular vectors at 390, 395 .. 730 nm, and the 128 that lie farthest\n"
           "// apart as coefficients. No sample of a Macbeth chart or ColorChecker is among them.\n"
-          "#include \"colorimetry/tables/bands.h\"\n", file.stream);
+          "#include \"colorimetry/tables/bands.h\"\n",
+          file.stream);
     put_rows(file.stream, "REFLECTANCE_BASIS[BASIS_VECTORS][BASIS_SAMPLES]", "%.7f", d->samples[0],
              BASIS_VECTORS, BASIS_SAMPLES);
     put_rows(file.stream, "REFLECTANCE_ROWS[TRAINING_ROWS][BASIS_VECTORS]", "%.6f",
@@ -95,7 +97,8 @@ static bool write_shapes(const char *path, const struct derived *d, struct error
     fputs("// Gaussian bands, centres and standard deviations in nm, that leave the least\n"
           "// CIEDE2000 over the training reflectances and a dozen lamps; rms is what they leave.\n"
           "#include \"colorimetry/tables/bands.h\"\n\n"
-          "const struct band_shapes BAND_SHAPES[BANDS_MOST - BANDS_LEAST + 1] = {", file.stream);
+          "const struct band_shapes BAND_SHAPES[BANDS_MOST - BANDS_LEAST + 1] = {",
+          file.stream);
     for (int n = BANDS_LEAST; n <= BANDS_MOST; n++) {
         fprintf(file.stream, "\n    // %d bands, rms %.3f\n    {{", n, d->rms[n]);
         put_numbers(file.stream, "%.2f", d->sets[n].centre_nm, n);
@@ -119,7 +122,8 @@ static bool derive(const struct task *task, struct derived *d, struct error *err
         ok = band_set_optimise(&d->training, n, &d->sets[n], &d->rms[n], err) ||
              while_doing(err, "%d bands", n);
         if (ok)
-            printf("%d bands: rms CIEDE2000 %.3f over rows and lamps of the training\n", n, d->rms[n]);
+            printf("%d bands: rms CIEDE2000 %.3f over rows and lamps of the training\n", n,
+                   d->rms[n]);
         fflush(stdout);
     }
     return ok;

@@ -14,7 +14,7 @@ static const struct training_lamp {
     const char *name;
     double weight;
 } LAMPS[] = {
-    {"A", 1},      {"D50", 1},    {"D65", 1.5},    {"FL8", 1},      {"FL3.15", 1},
+    {"A", 1},     {"D50", 1},    {"D65", 1.5},  {"FL8", 1},      {"FL3.15", 1},
     {"FL2", 0.3}, {"FL10", 0.3}, {"FL11", 0.3}, {"LED-B3", 0.3},
 };
 

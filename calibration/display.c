@@ -15,16 +15,21 @@
 
 static void warn_misfit(const struct display_fit *f)
 {
-    fprintf(stderr,
-            "boothcal: warning: three curves and a matrix do not describe this panel: mean %.2f, 95th "
-            "percentile %.2f CIEDE2000", f->de00.mean, f->de00.p95);
+    fprintf(
+        stderr,
+        "boothcal: warning: three curves and a matrix do not describe this panel: mean %.2f, 95th "
+        "percentile %.2f CIEDE2000",
+        f->de00.mean, f->de00.p95);
     if (f->primaries && fabs(f->additivity) > 0.02)
-        fprintf(stderr, ": its channels do not add (red, green and blue alone sum to %+.1f %% of white's "
-                        "luminance)", 100 * f->additivity);
+        fprintf(stderr,
+                ": its channels do not add (red, green and blue alone sum to %+.1f %% of white's "
+                "luminance)",
+                100 * f->additivity);
     else if (f->drifted)
         fprintf(stderr, ": it changed while it was measured");
     else
-        fprintf(stderr, ": colours of the channels change along their ramps, or the readings are noisy");
+        fprintf(stderr,
+                ": colours of the channels change along their ramps, or the readings are noisy");
     fputc('\n', stderr);
 }
 
@@ -34,14 +39,18 @@ static int warn(const struct measurements *m, const struct display_model *model,
     if (f->misfit)
         warn_misfit(f);
     if (f->ill_conditioned)
-        fprintf(stderr, "boothcal: warning: primaries are much alike (condition number %.1f, sound below "
-                        "10): errors grow by that factor\n", model->condition);
+        fprintf(stderr,
+                "boothcal: warning: primaries are much alike (condition number %.1f, sound below "
+                "10): errors grow by that factor\n",
+                model->condition);
     if (f->drifted)
-        fprintf(stderr, "boothcal: warning: %s: white drifted by %.1f %% over %d readings (sound below "
-                        "3 %%): warm the panel up and measure again\n",
+        fprintf(stderr,
+                "boothcal: warning: %s: white drifted by %.1f %% over %d readings (sound below "
+                "3 %%): warm the panel up and measure again\n",
                 m->path, 100 * m->white_drift, m->whites);
     if (!m->absolute)
-        fprintf(stderr, "boothcal: warning: %s: no LUMINANCE_XYZ_CDM2: white is taken as %.5g cd/m2\n",
+        fprintf(stderr,
+                "boothcal: warning: %s: no LUMINANCE_XYZ_CDM2: white is taken as %.5g cd/m2\n",
                 m->path, m->white.Y);
     return f->misfit || f->ill_conditioned || f->drifted || !m->absolute ? COMMAND_WARNED
                                                                          : COMMAND_FINE;
@@ -53,8 +62,9 @@ static void print_fit(const struct measurements *m, const struct display_model *
     struct xyz black = display_black(model);
     printf("%s: %d patches, CIEDE2000 mean %.3f, median %.3f, 95th percentile %.3f, largest %.3f\n",
            m->path, f->patches, f->de00.mean, f->de00.median, f->de00.p95, f->de00.max);
-    printf("white %.5g cd/m2, black %.3g cd/m2, condition number %.2f, %d of %d curve nodes pooled\n",
-           m->white.Y, black.Y, model->condition, f->pooled, 3 * DISPLAY_NODES);
+    printf(
+        "white %.5g cd/m2, black %.3g cd/m2, condition number %.2f, %d of %d curve nodes pooled\n",
+        m->white.Y, black.Y, model->condition, f->pooled, 3 * DISPLAY_NODES);
 }
 
 static struct display_origin origin_of(const struct measurements *m, const struct display_fit *f)
@@ -183,7 +193,8 @@ static bool three_numbers(const char *line, double v[3], struct error *err)
         if (!size)
             return fail(err, ERROR_DATA, "%d number(s), not three", i);
         if (end != at + size || !isfinite(v[i]))
-            return fail(err, ERROR_DATA, "\"%.*s\" is not a finite number", size > 40 ? 40 : size, at);
+            return fail(err, ERROR_DATA, "\"%.*s\" is not a finite number", size > 40 ? 40 : size,
+                        at);
         at = end + strspn(end, gap);
     }
     return !*at || fail(err, ERROR_DATA, "more than three numbers");
@@ -257,7 +268,8 @@ int command_display(int argc, char **argv)
     static const struct command TABLE[] = {
         {"fit", command_fit, "TRAIN.ti3 -o D.ini",
          "Fits three curves and a 3x4 matrix to measured patches. Exit 3: done, with a warning\n"
-         "      (primaries much alike, the panel is no such model, white drifted, no absolute white)."},
+         "      (primaries much alike, the panel is no such model, white drifted, no absolute "
+         "white)."},
         {"check", command_check, "D.ini TEST.ti3 [--json]",
          "CIEDE2000 of a model against measured patches: mean, median, p95, max, n."},
         {"forward", command_forward, "D.ini",

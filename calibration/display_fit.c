@@ -153,7 +153,8 @@ static bool patch_residuals(const struct fit *f, int index, const double *x, dou
     residuals[1] = r.y;
     residuals[2] = r.z;
     if (jacobian)
-        patch_slopes(f, x, mat3_mul(t->metric, lab_slopes(seen, f->m->white)), light, by_q, jacobian);
+        patch_slopes(f, x, mat3_mul(t->metric, lab_slopes(seen, f->m->white)), light, by_q,
+                     jacobian);
     return true;
 }
 
@@ -250,7 +251,7 @@ static bool solve(struct fit *f, struct display_model *model, struct display_fit
         .evaluate = residuals_of,
         .context = f,
         .robust = ROBUST_DE00,
-        .iterations = 200,
+        .iterations = 500,
     };
     start_at(f, x);
     if (!aim(f, err) || !least_squares_solve(&problem, x, &result, err))
@@ -358,7 +359,8 @@ static bool plan(struct fit *f, struct error *err)
     if (f->m->count < PATCHES_LEAST || seen < 4)
         return fail(err, ERROR_DATA,
                     "%s: %d patches with %d levels of a channel cannot decide a display model; at "
-                    "least %d patches and 4 levels", f->m->path, f->m->count, seen, PATCHES_LEAST);
+                    "least %d patches and 4 levels",
+                    f->m->path, f->m->count, seen, PATCHES_LEAST);
     f->intervals = seen / 2 < 2 ? 2 : seen / 2 > INTERVALS_MOST ? INTERVALS_MOST : seen / 2;
     f->slopes = f->intervals + 2;
     f->parameters = MATRIX + 3 * f->slopes;

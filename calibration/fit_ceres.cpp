@@ -11,10 +11,12 @@ extern "C" {
 }
 #include "calibration/fit_ceres.h"
 
-namespace {
+namespace
+{
 
-class Group : public ceres::CostFunction {
-public:
+class Group : public ceres::CostFunction
+{
+  public:
     Group(const least_squares &problem, int group) : problem_(problem), group_(group)
     {
         set_num_residuals(problem.group_size);
@@ -30,7 +32,7 @@ public:
                (!jacobian || Differences(x[0], jacobian));
     }
 
-private:
+  private:
     bool Differences(const double *x, double *jacobian) const
     {
         const int n = problem_.parameters, m = problem_.group_size;
@@ -58,8 +60,8 @@ bool Solve(const least_squares &p, std::vector<double> &x, least_squares_result 
 {
     ceres::Problem problem;
     for (int g = 0; g < p.groups; g++)
-        problem.AddResidualBlock(new Group(p, g),
-                                 p.robust > 0 ? new ceres::SoftLOneLoss(p.robust) : nullptr, x.data());
+        problem.AddResidualBlock(
+            new Group(p, g), p.robust > 0 ? new ceres::SoftLOneLoss(p.robust) : nullptr, x.data());
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::DENSE_QR;
     options.max_num_iterations = p.iterations;

@@ -23,10 +23,10 @@ struct least_squares {
     int group_size; // residuals of a group, >= 1
     residual_group *evaluate;
     void *context;
-    bool numeric;   // true: evaluate never gets a jacobian; central differences instead
-    double robust;  // > 0: groups count by soft L1 of their norm beyond this; 0: squares
+    bool numeric;     // true: evaluate never gets a jacobian; central differences instead
+    double robust;    // > 0: groups count by soft L1 of their norm beyond this; 0: squares
     double tolerance; // relative change of the cost that ends the search; 0: 1e-10
-    int iterations; // at most, >= 1
+    int iterations;   // at most, >= 1
 };
 
 struct least_squares_result {

@@ -37,8 +37,10 @@ static bool find_fields(const struct table *t, int column[6], struct error *err)
     for (int f = 0; f < 6; f++) {
         column[f] = table_column(t, field_names[f]);
         if (column[f] < 0)
-            return fail(err, ERROR_DATA, "%s: field %s is missing; needed are RGB_R RGB_G RGB_B XYZ_X "
-                        "XYZ_Y XYZ_Z", t->path, field_names[f]);
+            return fail(err, ERROR_DATA,
+                        "%s: field %s is missing; needed are RGB_R RGB_G RGB_B XYZ_X "
+                        "XYZ_Y XYZ_Z",
+                        t->path, field_names[f]);
     }
     if (t->rows < 1)
         return fail(err, ERROR_DATA, "%s: NUMBER_OF_SETS: no patches", t->path);
@@ -113,8 +115,8 @@ static bool find_scale(const struct cgats *file, struct measurements *m, double 
     if (known && !cgats_numbers(file, "LUMINANCE_XYZ_CDM2", v, 3, err))
         return false;
     if (!known && !m->whites)
-        return fail(err, ERROR_DATA, "%s: no white: neither LUMINANCE_XYZ_CDM2 nor a patch of 100 100 100",
-                    m->path);
+        return fail(err, ERROR_DATA,
+                    "%s: no white: neither LUMINANCE_XYZ_CDM2 nor a patch of 100 100 100", m->path);
     m->white = known ? (struct xyz){v[0], v[1], v[2]} : shown;
     if (!(m->white.X > 0 && m->white.Y > 0 && m->white.Z > 0))
         return fail(err, ERROR_DATA, "%s:%d: white: %g %g %g is not above zero", m->path,
@@ -126,9 +128,11 @@ static bool find_scale(const struct cgats *file, struct measurements *m, double 
     if (!(factor < UNITS_FACTOR_MOST && factor > 1 / UNITS_FACTOR_MOST))
         return fail(err, ERROR_DATA,
                     "%s:%d: %s: white has Y = %g, but the patch 100 100 100 measured %g "
-                    "(NORMALIZED_TO_Y_100 is %s)", m->path, keyword_line(file, known ? "LUMINANCE_XYZ_CDM2" : "NORMALIZED_TO_Y_100"),
-                    known ? "LUMINANCE_XYZ_CDM2" : "NORMALIZED_TO_Y_100", expected, shown.Y * *scale,
-                    relative ? "YES" : "NO");
+                    "(NORMALIZED_TO_Y_100 is %s)",
+                    m->path,
+                    keyword_line(file, known ? "LUMINANCE_XYZ_CDM2" : "NORMALIZED_TO_Y_100"),
+                    known ? "LUMINANCE_XYZ_CDM2" : "NORMALIZED_TO_Y_100", expected,
+                    shown.Y * *scale, relative ? "YES" : "NO");
     return true;
 }
 
@@ -153,11 +157,25 @@ static bool take(const struct cgats *file, struct measurements *m, struct error 
         return false;
     m->patches = calloc(file->table.rows, sizeof *m->patches);
     if (!m->patches)
-        return fail(err, ERROR_SYSTEM, "%s: out of memory for %zu patches", m->path, file->table.rows);
+        return fail(err, ERROR_SYSTEM, "%s: out of memory for %zu patches", m->path,
+                    file->table.rows);
     for (size_t row = 0; row < file->table.rows; row++)
         if (!take_row(&file->table, row, column, &m->patches[m->count++], err))
             return false;
     return find_scale(file, m, &scale, err) && rescale(m, scale, err);
+}
+
+static const char *base_name(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    return slash ? slash + 1 : path;
+}
+
+static int base_size(const char *path)
+{
+    const char *name = base_name(path);
+    const char *point = strrchr(name, '.');
+    return (int)(point && point != name ? (size_t)(point - name) : strlen(name));
 }
 
 bool measurements_load(const char *path, struct measurements *m, struct error *err)
@@ -170,6 +188,8 @@ bool measurements_load(const char *path, struct measurements *m, struct error *e
     keep(taken.instrument, sizeof taken.instrument, &file, "TARGET_INSTRUMENT");
     keep(taken.created, sizeof taken.created, &file, "CREATED");
     keep(taken.display, sizeof taken.display, &file, "DISPLAY");
+    if (!*taken.display)
+        snprintf(taken.display, sizeof taken.display, "%.*s", base_size(path), base_name(path));
     bool taken_all = take(&file, &taken, err);
     cgats_fini(&file);
     if (taken_all)

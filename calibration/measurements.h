@@ -13,7 +13,8 @@ struct measured_patch {
 };
 
 struct measurements {
-    char path[512], instrument[128], created[32], display[128];
+    char path[512], instrument[128], created[32];
+    char display[128]; // keyword DISPLAY, else the file's name without its suffix
     int count;
     struct measured_patch *patches; // owned
     struct xyz white;   // cd/m2: LUMINANCE_XYZ_CDM2, else the mean of the 100/100/100 rows

@@ -79,10 +79,12 @@ static bool take(const struct set *set, const char *path, const struct matrix *g
 {
     double nm[SAMPLES_MOST], values[SAMPLES_MOST];
     if (grid->rows * grid->columns != 3 || m->rows > SAMPLES_MOST || grid->v[2] != m->rows)
-        return fail(err, ERROR_DATA, "%s: S_%s does not describe sur_%s", path, set->name, set->name);
+        return fail(err, ERROR_DATA, "%s: S_%s does not describe sur_%s", path, set->name,
+                    set->name);
     size_t first = 0;
     size_t last = m->rows - 1;
-    while (first < last && (grid->v[0] + grid->v[1] * first < set->from_nm || is_padding(m, first, first + 1)))
+    while (first < last &&
+           (grid->v[0] + grid->v[1] * first < set->from_nm || is_padding(m, first, first + 1)))
         first++;
     while (last > first && is_padding(m, last, last - 1))
         last--;
@@ -92,7 +94,8 @@ static bool take(const struct set *set, const char *path, const struct matrix *g
             values[r - first] = m->v[c * m->rows + r] / set->full;
         }
         out->weights[out->count] = set->weight;
-        if (!spectrum_from_samples(nm, values, last - first + 1, true, &out->spectra[out->count++], err))
+        if (!spectrum_from_samples(nm, values, last - first + 1, true, &out->spectra[out->count++],
+                                   err))
             return while_doing(err, "%s: sur_%s, spectrum %zu", path, set->name, c + 1);
     }
     return true;
@@ -118,7 +121,8 @@ static bool load(const char *folder, const struct set *set, struct reflectances 
     snprintf(name, sizeof name, "sur_%s", set->name);
     mat_t *file = Mat_Open(path, MAT_ACC_RDONLY);
     if (!file)
-        return fail(err, ERROR_CONFIG, "%s: no such MAT file (Debian: psychtoolbox-3-common)", path);
+        return fail(err, ERROR_CONFIG, "%s: no such MAT file (Debian: psychtoolbox-3-common)",
+                    path);
     bool ok = read_matrix(file, path, grid_name, &grid, err) &&
               read_matrix(file, path, name, &m, err) && grow(out, m.columns, err) &&
               take(set, path, &grid, &m, out, err);

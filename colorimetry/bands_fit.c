@@ -36,7 +36,8 @@ bool band_aim_at(const struct band_training *training, const struct spectrum *la
     struct xyz basis[BASIS_VECTORS];
     struct xyz white = xyz_relative(lamp, NULL, observer);
     if (!(white.X > 0 && white.Y > 0 && white.Z > 0))
-        return fail(err, ERROR_DATA, "the lamp is dark: X %g, Y %g, Z %g", white.X, white.Y, white.Z);
+        return fail(err, ERROR_DATA, "the lamp is dark: X %g, Y %g, Z %g", white.X, white.Y,
+                    white.Z);
     out->white = white;
     for (int v = 0; v < BASIS_VECTORS; v++)
         basis[v] = xyz_relative(lamp, &training->basis[v], observer);

@@ -8,8 +8,8 @@
 #include "colorimetry/bands.h"
 
 enum {
-    BASIS_VECTORS = 20,   // at least BANDS_MOST, or many bands are not decided
-    BASIS_SAMPLES = 69,   // of a vector as it ships: 390, 395 .. 730 nm, held outside
+    BASIS_VECTORS = 20, // at least BANDS_MOST, or many bands are not decided
+    BASIS_SAMPLES = 69, // of a vector as it ships: 390, 395 .. 730 nm, held outside
     BASIS_FIRST_NM = 390,
     BASIS_STEP_NM = 5,
     TRAINING_ROWS = 128,

@@ -12,7 +12,8 @@ static const double SLOPE_LEAST = 1e-6;
 #define curve_node(curve, index) ((curve)[index])
 #include "colorimetry/display.glsl"
 
-_Static_assert(DISPLAY_NODES == DISPLAY_LAST + 1, "display.glsl and display.h count the same nodes");
+_Static_assert(DISPLAY_NODES == DISPLAY_LAST + 1,
+               "display.glsl and display.h count the same nodes");
 
 static const char *const channel_names[3] = {"red", "green", "blue"};
 
@@ -73,7 +74,8 @@ static int pool_violators(double *curve)
     int pooled = 0;
     for (int k = 1; k < DISPLAY_LAST; k++) {
         pools[++top] = (struct pool){display_clamped(curve[k]), 1};
-        while (top > 0 && pools[top - 1].sum * pools[top].count > pools[top].sum * pools[top - 1].count) {
+        while (top > 0 &&
+               pools[top - 1].sum * pools[top].count > pools[top].sum * pools[top - 1].count) {
             pools[top - 1].sum += pools[top].sum;
             pools[top - 1].count += pools[top].count;
             top--;
@@ -124,7 +126,8 @@ struct display_inverse display_invert(const struct display_model *model, struct 
         display_inverse_row(m[2][0], m[2][1], m[2][2], X, Y, Z),
     };
     return (struct display_inverse){
-        .counts = {display_count(model->curve[0], linear.r), display_count(model->curve[1], linear.g),
+        .counts = {display_count(model->curve[0], linear.r),
+                   display_count(model->curve[1], linear.g),
                    display_count(model->curve[2], linear.b)},
         .linear = linear,
         .in_gamut = !display_outside(linear.r, GAMUT_TOLERANCE) &&

@@ -17,8 +17,9 @@ struct counts {
 };
 
 struct display_model {
-    char name[128]; // panel and serial
-    double curve[3][DISPLAY_NODES]; // linear light 0..1, strictly increasing, curve[c][0] = 0, last = 1
+    char name[128];                 // panel and serial
+    double curve[3][DISPLAY_NODES]; // linear light 0..1, strictly increasing, curve[c][0] = 0, last
+                                    // = 1
     double matrix[3][4];            // XYZ = matrix (r g b 1): cd/m2
     double inverse[3][3];           // of the left 3x3; filled by display_model_prepare
     double condition;               // of the left 3x3, 2-norm, columns as they are

@@ -18,12 +18,16 @@ struct display_file {
 };
 
 #define TEXT(in, field, preset_text, sentence)                                                     \
-    {.name = #field, .type = SETTING_TEXT, .offset = SETTING_FIELD(in, field),                     \
-     .size = SETTING_SIZE(in, field), .unit = "", .preset = preset_text, .help = sentence}
+    {                                                                                              \
+        .name = #field, .type = SETTING_TEXT, .offset = SETTING_FIELD(in, field),                  \
+        .size = SETTING_SIZE(in, field), .unit = "", .preset = preset_text, .help = sentence       \
+    }
 #define ROW(label, index)                                                                          \
-    {.name = label, .type = SETTING_VECTOR, .offset = index * 4 * sizeof(double), .size = 4,       \
-     .least = -1e6, .most = 1e6, .unit = "cd/m2",                                                  \
-     .help = "Tristimulus value of full red, green, blue and of black."}
+    {                                                                                              \
+        .name = label, .type = SETTING_VECTOR, .offset = index * 4 * sizeof(double), .size = 4,    \
+        .least = -1e6, .most = 1e6, .unit = "cd/m2",                                               \
+        .help = "Tristimulus value of full red, green, blue and of black."                         \
+    }
 
 static const struct setting name_rows[] = {
     TEXT(struct display_file, name, "", "Panel and serial number."),
@@ -37,14 +41,30 @@ static const struct setting origin_rows[] = {
     TEXT(struct display_origin, date, "", "When it was measured or fitted."),
     TEXT(struct display_origin, software, "", "Program that fitted."),
     TEXT(struct display_origin, source, "", "File of measured patches."),
-    {.name = "patches", .type = SETTING_INT, .offset = SETTING_FIELD(struct display_origin, patches),
-     .least = 0, .most = 1e6, .unit = "", .preset = "0", .help = "Patches fitted."},
-    {.name = "fit_mean_de00", .type = SETTING_DOUBLE,
-     .offset = SETTING_FIELD(struct display_origin, fit_mean_de00), .least = 0, .most = 1000,
-     .unit = "", .preset = "0", .help = "Mean CIEDE2000 over the fitted patches."},
-    {.name = "fit_max_de00", .type = SETTING_DOUBLE,
-     .offset = SETTING_FIELD(struct display_origin, fit_max_de00), .least = 0, .most = 1000,
-     .unit = "", .preset = "0", .help = "Largest CIEDE2000 over the fitted patches."},
+    {.name = "patches",
+     .type = SETTING_INT,
+     .offset = SETTING_FIELD(struct display_origin, patches),
+     .least = 0,
+     .most = 1e6,
+     .unit = "",
+     .preset = "0",
+     .help = "Patches fitted."},
+    {.name = "fit_mean_de00",
+     .type = SETTING_DOUBLE,
+     .offset = SETTING_FIELD(struct display_origin, fit_mean_de00),
+     .least = 0,
+     .most = 1000,
+     .unit = "",
+     .preset = "0",
+     .help = "Mean CIEDE2000 over the fitted patches."},
+    {.name = "fit_max_de00",
+     .type = SETTING_DOUBLE,
+     .offset = SETTING_FIELD(struct display_origin, fit_max_de00),
+     .least = 0,
+     .most = 1000,
+     .unit = "",
+     .preset = "0",
+     .help = "Largest CIEDE2000 over the fitted patches."},
     {0},
 };
 
@@ -58,8 +78,13 @@ static struct display_file *file_create(struct error *err)
     for (int k = 0; k < DISPLAY_NODES; k++) {
         snprintf(file->node_names[k], sizeof file->node_names[k], "node_%04d", k);
         file->node_rows[k] = (struct setting){
-            .name = file->node_names[k], .type = SETTING_VECTOR,
-            .offset = (size_t)k * sizeof file->nodes[0], .size = 3, .least = 0, .most = 1, .unit = "",
+            .name = file->node_names[k],
+            .type = SETTING_VECTOR,
+            .offset = (size_t)k * sizeof file->nodes[0],
+            .size = 3,
+            .least = 0,
+            .most = 1,
+            .unit = "",
             .help = "Linear light of red, green and blue at this 1020th of full code."};
     }
     return file;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Written by: boothcal bands optimise --basis reflectance_basis.c -o bands.c
+// clang-format off
 // Gaussian bands, centres and standard deviations in nm, that leave the least
 // CIEDE2000 over the training reflectances and a dozen lamps; rms is what they leave.
 #include "colorimetry/tables/bands.h"

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Written by: boothcal bands optimise --basis reflectance_basis.c -o bands.c
+// clang-format off
 // Reflectances of Munsell chips (Nickerson) and of natural and man-made objects
 // (Vrhel, Krinov, Koivisto), as Debian's psychtoolbox-3-common carries them: their
 // leading singular vectors at 390, 395 .. 730 nm, and the 128 that lie farthest

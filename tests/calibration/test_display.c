@@ -82,7 +82,8 @@ static void add(struct measurements *m, double r, double g, double b, double noi
 
 static struct measurements measured(double noise)
 {
-    struct measurements m = {.path = "panel", .white = panel((struct counts){1, 1, 1}), .absolute = true};
+    struct measurements m = {
+        .path = "panel", .white = panel((struct counts){1, 1, 1}), .absolute = true};
     m.patches = calloc(300, sizeof *m.patches);
     assert_non_null(m.patches);
     seed = 3;
@@ -105,7 +106,8 @@ static double mean_on_new_colours(const struct display_model *model)
     for (int n = 0; n < 1000; n++) {
         struct counts c = {uniform(), uniform(), uniform()};
         struct lab a, b;
-        assert_true(lab_of(panel(c), white, &a, NULL) && lab_of(display_forward(model, c), white, &b, NULL));
+        assert_true(lab_of(panel(c), white, &a, NULL) &&
+                    lab_of(display_forward(model, c), white, &b, NULL));
         sum += delta_e_2000(a, b) / 1000;
     }
     return sum;
@@ -115,9 +117,11 @@ static void write_ti3(const char *keywords, const char *rows, int count)
 {
     FILE *out = fopen(ti3, "w");
     assert_non_null(out);
-    fprintf(out, "CTI3\n\nDEVICE_CLASS \"DISPLAY\"\nCOLOR_REP \"RGB_XYZ\"\n%s\nNUMBER_OF_FIELDS 7\n"
-                 "BEGIN_DATA_FORMAT\nSAMPLE_ID RGB_R RGB_G RGB_B XYZ_X XYZ_Y XYZ_Z\nEND_DATA_FORMAT\n\n"
-                 "NUMBER_OF_SETS %d\nBEGIN_DATA\n%sEND_DATA\n", keywords, count, rows);
+    fprintf(out,
+            "CTI3\n\nDEVICE_CLASS \"DISPLAY\"\nCOLOR_REP \"RGB_XYZ\"\n%s\nNUMBER_OF_FIELDS 7\n"
+            "BEGIN_DATA_FORMAT\nSAMPLE_ID RGB_R RGB_G RGB_B XYZ_X XYZ_Y XYZ_Z\nEND_DATA_FORMAT\n\n"
+            "NUMBER_OF_SETS %d\nBEGIN_DATA\n%sEND_DATA\n",
+            keywords, count, rows);
     fclose(out);
 }
 
@@ -128,8 +132,9 @@ static void write_panel(void)
     size_t used = 0;
     for (int i = 0; i < m.count; i++) {
         struct measured_patch *p = &m.patches[i];
-        used += (size_t)sprintf(rows + used, "%d %.7g %.7g %.7g %.7g %.7g %.7g\n", i + 1, 100 * p->counts.r,
-                                100 * p->counts.g, 100 * p->counts.b, p->xyz.X, p->xyz.Y, p->xyz.Z);
+        used += (size_t)sprintf(rows + used, "%d %.7g %.7g %.7g %.7g %.7g %.7g\n", i + 1,
+                                100 * p->counts.r, 100 * p->counts.g, 100 * p->counts.b, p->xyz.X,
+                                p->xyz.Y, p->xyz.Z);
     }
     write_ti3("NORMALIZED_TO_Y_100 \"NO\"", rows, m.count);
     free(rows);
@@ -162,6 +167,7 @@ static void relative_values_become_absolute_through_the_luminance(void **state)
     assert_near(m.white_drift, 0.02, PRINTED);
     assert_int_equal(m.whites, 2);
     assert_true(m.absolute);
+    assert_string_equal(m.display, "m");
     measurements_fini(&m);
 }
 
@@ -358,7 +364,8 @@ static void forward_and_inverse_undo_each_other_line_by_line(void **state)
     assert_int_equal(run(5, fit), COMMAND_FINE);
     assert_int_equal(lines("forward", "50 25 75\n100, 100, 100\n", out, sizeof out), COMMAND_FINE);
     assert_int_equal(lines("inverse", out, back, sizeof back), COMMAND_FINE);
-    assert_int_equal(sscanf(back, "%lf %lf %lf %lf %lf %lf", v, v + 1, v + 2, v + 3, v + 4, v + 5), 6);
+    assert_int_equal(sscanf(back, "%lf %lf %lf %lf %lf %lf", v, v + 1, v + 2, v + 3, v + 4, v + 5),
+                     6);
     assert_near(v[0], 50, PRINTED);
     assert_near(v[1], 25, PRINTED);
     assert_near(v[2], 75, PRINTED);

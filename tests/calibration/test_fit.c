@@ -36,7 +36,8 @@ static bool misra(void *context, int group, const double *x, double *residuals, 
     return true;
 }
 
-static bool rosenbrock(void *context, int group, const double *x, double *residuals, double *jacobian)
+static bool rosenbrock(void *context, int group, const double *x, double *residuals,
+                       double *jacobian)
 {
     (void)context;
     (void)group;
@@ -55,7 +56,8 @@ static bool line(void *context, int group, const double *x, double *residuals, d
     return true;
 }
 
-static bool impossible(void *context, int group, const double *x, double *residuals, double *jacobian)
+static bool impossible(void *context, int group, const double *x, double *residuals,
+                       double *jacobian)
 {
     (void)context;
     (void)group;
@@ -82,8 +84,12 @@ static void certified_values_of_misra1a_are_found(void **state)
 static void numeric_derivatives_reach_the_valley_of_rosenbrock(void **state)
 {
     (void)state;
-    struct least_squares p = {.parameters = 2, .groups = 1, .group_size = 2, .evaluate = rosenbrock,
-                              .numeric = true, .iterations = 200};
+    struct least_squares p = {.parameters = 2,
+                              .groups = 1,
+                              .group_size = 2,
+                              .evaluate = rosenbrock,
+                              .numeric = true,
+                              .iterations = 200};
     struct least_squares_result result;
     double x[2] = {-1.2, 1};
     assert_true(least_squares_solve(&p, x, &result, NULL));
@@ -95,8 +101,12 @@ static void an_outlier_pulls_less_with_a_robust_loss(void **state)
 {
     (void)state;
     double y[5] = {1, 1.01, 0.99, 1, 50};
-    struct least_squares p = {.parameters = 1, .groups = 5, .group_size = 1, .evaluate = line,
-                              .context = y, .iterations = 100};
+    struct least_squares p = {.parameters = 1,
+                              .groups = 5,
+                              .group_size = 1,
+                              .evaluate = line,
+                              .context = y,
+                              .iterations = 100};
     struct least_squares_result result;
     double x[1] = {0};
     assert_true(least_squares_solve(&p, x, &result, NULL));
@@ -109,8 +119,12 @@ static void an_outlier_pulls_less_with_a_robust_loss(void **state)
 static void failures_leave_the_start_alone_and_say_why(void **state)
 {
     (void)state;
-    struct least_squares p = {.parameters = 2, .groups = 1, .group_size = 2, .evaluate = rosenbrock,
-                              .numeric = true, .iterations = 1};
+    struct least_squares p = {.parameters = 2,
+                              .groups = 1,
+                              .group_size = 2,
+                              .evaluate = rosenbrock,
+                              .numeric = true,
+                              .iterations = 1};
     struct least_squares_result result;
     struct error err = {0};
     double x[2] = {-1.2, 1};

@@ -76,7 +76,8 @@ struct spread {
     double mean, max;
 };
 
-static struct spread spread_of(int count, bool product, const char *lamp_name, enum observer observer)
+static struct spread spread_of(int count, bool product, const char *lamp_name,
+                               enum observer observer)
 {
     struct band_set set;
     struct spectrum lamp;

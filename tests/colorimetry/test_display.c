@@ -39,9 +39,10 @@ static double srgb_light(double v)
 // IEC 61966-2-1 with a 0.3 cd/m2 black.
 static struct display_model srgb(void)
 {
-    struct display_model m = {
-        .name = "sRGB",
-        .matrix = {{41.24, 35.76, 18.05, 0.3}, {21.26, 71.52, 7.22, 0.3}, {1.93, 11.92, 95.05, 0.4}}};
+    struct display_model m = {.name = "sRGB",
+                              .matrix = {{41.24, 35.76, 18.05, 0.3},
+                                         {21.26, 71.52, 7.22, 0.3},
+                                         {1.93, 11.92, 95.05, 0.4}}};
     for (int k = 0; k < DISPLAY_NODES; k++)
         m.curve[0][k] = m.curve[1][k] = m.curve[2][k] = srgb_light(k / 1020.0);
     assert_true(display_model_prepare(&m, NULL));
@@ -82,7 +83,8 @@ static void check_round_trips(const struct display_model *m)
     double rounded = 0;
     double ignored = 0;
     for (int g = 0; g < 256; g++)
-        worst = fmax(worst, worst_trip(m, (struct counts){g / 255.0, g / 255.0, g / 255.0}, &rounded));
+        worst =
+            fmax(worst, worst_trip(m, (struct counts){g / 255.0, g / 255.0, g / 255.0}, &rounded));
     seed = 1;
     for (int n = 0; n < 1000000; n++) {
         struct counts c = {floor(uniform() * 256) / 255, floor(uniform() * 256) / 255,
@@ -90,7 +92,8 @@ static void check_round_trips(const struct display_model *m)
         worst = fmax(worst, worst_trip(m, c, &rounded));
     }
     for (int n = 0; n < 100000; n++)
-        worst = fmax(worst, worst_trip(m, (struct counts){uniform(), uniform(), uniform()}, &ignored));
+        worst =
+            fmax(worst, worst_trip(m, (struct counts){uniform(), uniform(), uniform()}, &ignored));
     assert_true(worst < BEFORE_ROUNDING);
     assert_true(rounded < AFTER_ROUNDING);
 }
@@ -169,7 +172,8 @@ static void negative_and_absurd_targets_stay_finite_and_flagged(void **state)
 {
     (void)state;
     struct display_model m = srgb();
-    const struct xyz targets[] = {{-5, -5, -5}, {1e12, 0, 0}, {0, 0, 0}, {NAN, 1, 1}, {1, INFINITY, 1}};
+    const struct xyz targets[] = {
+        {-5, -5, -5}, {1e12, 0, 0}, {0, 0, 0}, {NAN, 1, 1}, {1, INFINITY, 1}};
     for (size_t i = 0; i < sizeof targets / sizeof *targets; i++) {
         struct display_inverse at = display_invert(&m, targets[i]);
         assert_false(at.in_gamut);

@@ -36,9 +36,10 @@ static int drop_folder(void **state)
 
 static struct display_model model(void)
 {
-    struct display_model m = {
-        .name = "Panel 7",
-        .matrix = {{410.1, 350.7, 180.3, 0.31}, {212.6, 715.2, 72.2, 0.30}, {19.3, 119.2, 950.5, 0.44}}};
+    struct display_model m = {.name = "Panel 7",
+                              .matrix = {{410.1, 350.7, 180.3, 0.31},
+                                         {212.6, 715.2, 72.2, 0.30},
+                                         {19.3, 119.2, 950.5, 0.44}}};
     for (int c = 0; c < 3; c++) {
         for (int k = 0; k < DISPLAY_NODES; k++)
             m.curve[c][k] = pow(k / 1020.0, 2.1 + c / 10.0);
