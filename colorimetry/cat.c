@@ -16,6 +16,8 @@ static struct vec3 cones_of_white(struct mat3 cones, struct xyz white)
 struct mat3 cat_matrix(enum cat cat, struct xyz from, struct xyz to, double degree)
 {
     struct mat3 cones = CONES[cat], back;
+    if (!(from.Y > 0 && to.Y > 0))
+        return mat3_identity();
     struct vec3 a = cones_of_white(cones, from), b = cones_of_white(cones, to);
     if (!mat3_invert(cones, &back))
         return mat3_identity();

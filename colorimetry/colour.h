@@ -96,7 +96,8 @@ enum cat { CAT_02, CAT_16 };
 
 // Matrix that adapts colours seen under white `from` to white `to` (Y of both
 // scaled to 1 first), D = degree of adaptation 0..1. Von Kries in the CAT's
-// cone space. Source: CIE 159:2004 (CAT02); Li et al. 2017 (CAT16).
+// cone space; the identity for a white without light. Source: CIE 159:2004
+// (CAT02); Li et al. 2017 (CAT16).
 struct mat3 cat_matrix(enum cat cat, struct xyz from, struct xyz to, double degree);
 
 static inline struct xyz xyz_apply(struct mat3 m, struct xyz c)

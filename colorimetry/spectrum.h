@@ -21,7 +21,8 @@ struct spectrum {
 
 // Onto the grid from count (>= 2) samples at strictly increasing nm:
 // - equal steps of 2..20 nm: Sprague (5th order) as CIE 167 says, cubic with
-//   fewer than six samples; clamped at 0 when all samples are >= 0;
+//   fewer than six samples; when all samples are >= 0, what undershoots is cut
+//   and paid for by the peak beside it, so that energy is kept;
 // - steps finer than 1 nm anywhere: binned by overlap (mean over each 1 nm
 //   bin), so that energy is kept;
 // - anything else: linear.

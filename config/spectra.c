@@ -182,13 +182,14 @@ static bool check_header(const struct cgats *file, struct fields *f, struct erro
         !cgats_numbers(file, "SPECTRAL_NORM", &norm, 1, err))
         return false;
     double first = f->nm[0], last = f->nm[f->count - 1];
+    const char *first_is = "the first field is SPEC_", *last_is = "the last field is SPEC_";
     if (bands != (double)f->count)
         return contradicts(file, "SPECTRAL_BANDS", bands, "the number of SPEC_ fields is ",
                            (double)f->count, err);
     if (fabs(start - first) > FIELD_SLACK_NM)
-        return contradicts(file, "SPECTRAL_START_NM", start, "the first field is SPEC_", first, err);
+        return contradicts(file, "SPECTRAL_START_NM", start, first_is, first, err);
     if (fabs(end - last) > FIELD_SLACK_NM)
-        return contradicts(file, "SPECTRAL_END_NM", end, "the last field is SPEC_", last, err);
+        return contradicts(file, "SPECTRAL_END_NM", end, last_is, last, err);
     if (!(norm > 0))
         return fail(err, ERROR_DATA, "%s:%d: SPECTRAL_NORM is %g; it must be above 0",
                     file->table.path, line_of(file, "SPECTRAL_NORM"), norm);

@@ -370,7 +370,41 @@ static void adaptation_between_equal_whites_changes_nothing(void **state)
     }
 }
 
-// Fairchild's example for CAT02 in CIE 159, by the inverse of the way there.
+// The figures that the tests of colour-science carry, with eight decimals.
+static void cat02_gives_known_figures(void **state)
+{
+    (void)state;
+    const struct xyz d65 = {0.95045593, 1, 1.08905775};
+    const struct {
+        struct xyz colour, to, wanted;
+    } rows[] = {
+        {{0.20654008, 0.12197225, 0.05136952},
+         {0.96429568, 1, 0.82510460},
+         {0.21638819, 0.12570000, 0.03847494}},
+        {{0.14222010, 0.23042768, 0.10495772},
+         {1.09846607, 1, 0.35582280},
+         {0.18673833, 0.23111171, 0.03285972}},
+        {{0.07818780, 0.06157201, 0.28099326},
+         {0.99144661, 1, 0.67315942},
+         {0.06385467, 0.05509729, 0.17506386}},
+    };
+    for (int i = 0; i < 3; i++) {
+        struct xyz got = xyz_apply(cat_matrix(CAT_02, d65, rows[i].to, 1), rows[i].colour);
+        assert_near(got.X, rows[i].wanted.X, 1e-8);
+        assert_near(got.Y, rows[i].wanted.Y, 1e-8);
+        assert_near(got.Z, rows[i].wanted.Z, 1e-8);
+    }
+}
+
+static void adaptation_to_a_white_without_light_changes_nothing(void **state)
+{
+    (void)state;
+    struct mat3 one = mat3_identity(), m = cat_matrix(CAT_16, WHITE_A, (struct xyz){0, 0, 0}, 1);
+    assert_memory_equal(&m, &one, sizeof one);
+    m = cat_matrix(CAT_02, (struct xyz){NAN, NAN, NAN}, WHITE_A, 1);
+    assert_memory_equal(&m, &one, sizeof one);
+}
+
 static void adaptation_there_and_back_is_the_identity(void **state)
 {
     (void)state;
@@ -483,6 +517,8 @@ int main(void)
         cmocka_unit_test(the_perfect_white_has_y_100_and_a_dark_lamp_shows_nothing),
         cmocka_unit_test(adaptation_maps_white_to_white),
         cmocka_unit_test(adaptation_between_equal_whites_changes_nothing),
+        cmocka_unit_test(cat02_gives_known_figures),
+        cmocka_unit_test(adaptation_to_a_white_without_light_changes_nothing),
         cmocka_unit_test(adaptation_there_and_back_is_the_identity),
         cmocka_unit_test(cct_and_duv_agree_with_ohno),
         cmocka_unit_test(cct_agrees_with_the_whole_oracle),
