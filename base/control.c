@@ -269,6 +269,7 @@ struct caller {
 struct control_server {
     int fd;
     bool resting; // accept failed: leave the queue alone for one round
+    bool crowded; // the last round ended with every place taken and somebody waiting
     struct sockaddr_un address;
     dev_t device;
     ino_t inode;
@@ -494,19 +495,32 @@ static void turn_away(int fd)
     close(fd);
 }
 
+static struct caller *free_place(struct control_server *server)
+{
+    for (int i = 0; i < CLIENTS_MOST; i++)
+        if (server->callers[i].fd < 0)
+            return &server->callers[i];
+    return NULL;
+}
+
+// Nobody is turned away before a whole round found every place still taken:
+// those in them may have gone.
 static void accept_callers(struct control_server *server)
 {
-    for (int tries = 0; tries < 2 * CLIENTS_MOST; tries++) {
+    for (int tries = 0; tries < CLIENTS_MOST; tries++) {
+        struct caller *caller = free_place(server);
+        if (!caller && !server->crowded) {
+            server->crowded = true;
+            return;
+        }
         int fd = accept4(server->fd, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
         if (fd < 0) {
             server->resting = errno != EAGAIN && errno != EINTR && errno != ECONNABORTED;
             return;
         }
-        int i = 0;
-        while (i < CLIENTS_MOST && server->callers[i].fd >= 0)
-            i++;
-        if (i < CLIENTS_MOST)
-            server->callers[i].fd = fd;
+        server->crowded = !caller;
+        if (caller)
+            caller->fd = fd;
         else
             turn_away(fd);
     }
@@ -518,6 +532,8 @@ static void serve_caller(struct control_server *server, struct caller *caller, s
     bool ok = !(events & (POLLERR | POLLNVAL)) && !(caller->awaited && events & POLLHUP);
     caller->answered = false;
     if (ok && !caller->out.used && !caller->awaited && events & (POLLIN | POLLHUP))
+        ok = read_more(caller);
+    while (ok && events & POLLHUP && !caller->ended && caller->in.used <= LINE_MOST)
         ok = read_more(caller);
     if (!ok || !answer_lines(server, caller, handle, context))
         hang_up(caller);

@@ -511,6 +511,31 @@ static void the_reply_to_a_call_that_timed_out_is_not_taken_for_the_next(void **
     rmdir(folder);
 }
 
+static void nobody_is_turned_away_for_clients_that_have_gone(void **state)
+{
+    (void)state;
+    char folder[] = "/tmp/control-XXXXXX", line[256] = "";
+    struct stage s = {0};
+    assert_non_null(mkdtemp(folder));
+    snprintf(s.path, sizeof s.path, "%s/s", folder);
+    s.server = control_listen(s.path, NULL);
+    // All of them wait in the queue before the server first looks.
+    for (int i = 0; i < 16; i++) {
+        int gone = raw_connect(s.path);
+        assert_true(raw_send(gone, "{\"do\"", 5));
+        close(gone);
+    }
+    int fd = raw_connect(s.path);
+    assert_true(raw_send(fd, "{\"do\":\"echo\",\"value\":1}\n", 26));
+    for (int i = 0; i < 4; i++)
+        assert_true(control_serve(s.server, 0, handle, &s, NULL));
+    assert_true(raw_line(fd, line, sizeof line) > 0);
+    assert_string_equal(line, "{\"value\":1,\"ok\":true}");
+    close(fd);
+    control_unlisten(s.server);
+    rmdir(folder);
+}
+
 static void answers_that_are_no_replies_are_data_errors(void **state)
 {
     (void)state;
@@ -567,6 +592,7 @@ int main(void)
         cmocka_unit_test(a_server_does_not_remove_the_socket_of_its_successor),
         cmocka_unit_test(calling_where_nobody_listens_is_gone),
         cmocka_unit_test(the_reply_to_a_call_that_timed_out_is_not_taken_for_the_next),
+        cmocka_unit_test(nobody_is_turned_away_for_clients_that_have_gone),
         cmocka_unit_test(answers_that_are_no_replies_are_data_errors),
     };
     return cmocka_run_group_tests_name("control", tests, NULL, NULL);
