@@ -9,7 +9,8 @@ static const struct command FAMILIES[] = {
     {"colour", command_colour, "deltae|spectrum", "colour differences; colours of spectra"},
     {"display", command_display, "fit|check|forward|inverse", "the display model of a panel"},
     {"bands", command_bands, "optimise|check", "the bands that carry reflectances"},
-    {"session", command_session, "--config FILE --maps FOLDER -o FOLDER", "from bare settings to an accuracy report"},
+    {"session", command_session, "--config FILE --maps FOLDER -o FOLDER",
+     "from bare settings to an accuracy report"},
     {NULL, NULL, NULL, NULL},
 };
 
@@ -20,6 +21,8 @@ int main(int argc, char **argv)
         return COMMAND_FINE;
     }
     int code = command_run("boothcal", FAMILIES, argc, argv);
+    if (argc >= 2 && (!strcmp(argv[1], "--help") || !strcmp(argv[1], "-h")))
+        printf("  boothcal --version\n  boothcal FAMILY --help\n");
     if (fflush(stdout) || ferror(stdout)) {
         fprintf(stderr, "boothcal: standard output cannot be written\n");
         return COMMAND_FAILED;
