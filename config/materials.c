@@ -50,17 +50,7 @@ static bool reflectances_load(const char *path, struct spectra *out, struct erro
 {
     if (!*path)
         return fail(err, ERROR_CONFIG, "source: must name a table of spectra");
-    if (!spectra_load(path, true, out, err))
-        return false;
-    for (int i = 0; i < out->count; i++)
-        for (int k = 0; k < SPECTRUM_COUNT; k++)
-            if (out->spectra[i].v[k] < 0 || out->spectra[i].v[k] > 2) {
-                fail(err, ERROR_CONFIG, "%s: %s: %g at %d nm is no reflectance, 0..2 is allowed",
-                     path, out->names[i], out->spectra[i].v[k], SPECTRUM_FIRST_NM + k);
-                spectra_fini(out);
-                return false;
-            }
-    return true;
+    return spectra_load(path, true, out, err);
 }
 
 // Index of the background among the spectra; a number is added as a grey.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The state estimator on an injected clock.
-#include "tests/daemon/support.h"
+#include "tests/fakes/support.h"
 
 #include "colorimetry/colour.h"
 #include "colorimetry/illuminant.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the daemon's tests share.
-#ifndef TESTS_DAEMON_SUPPORT_H
-#define TESTS_DAEMON_SUPPORT_H
+// What tests of config and daemon share.
+#ifndef TESTS_FAKES_SUPPORT_H
+#define TESTS_FAKES_SUPPORT_H
 
 #include <setjmp.h>
 #include <stdarg.h>
