@@ -43,7 +43,9 @@ void control_close(struct control_client *client);
 
 // Sends request (stolen) and waits for its reply until timeout_ms have passed.
 // Returns the reply object of an "ok": true answer, to be json_decref'd; NULL
-// with err filled from the answer's own code and text otherwise. One thread.
+// with err filled from the answer's own code and text otherwise: RETRY when no
+// reply came in time (a late one is not taken for the next call's), GONE when
+// the connection is lost. One thread.
 json_t *control_call(struct control_client *client, json_t *request, int timeout_ms,
                      struct error *err);
 
@@ -54,7 +56,9 @@ typedef json_t *control_handler(void *context, const char *what, json_t *request
 struct control_server;
 
 // Listens at path (an old socket file that nobody serves is replaced; mode
-// 0600). At most 16 clients; a line longer than 1 MiB ends its connection.
+// 0600); a plain file or a served socket there is left alone (CONFIG). At most
+// 16 clients, one more is told RETRY; a line longer than 1 MiB ends its
+// connection; a line that is no request is answered with DATA.
 struct control_server *control_listen(const char *path, struct error *err);
 void control_unlisten(struct control_server *server);
 
