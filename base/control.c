@@ -12,7 +12,13 @@
 
 #include "base/clock.h"
 
-enum { LINE_MOST = 1 << 20, REPLY_MOST = 1 << 26, CHUNK = 1 << 16, CLIENTS_MOST = 16, REST_MS = 100 };
+enum {
+    LINE_MOST = 1 << 20,
+    REPLY_MOST = 1 << 26,
+    CHUNK = 1 << 16,
+    CLIENTS_MOST = 16,
+    REST_MS = 100
+};
 
 // Bytes waiting to be parsed or sent.
 struct bytes {
@@ -296,8 +302,8 @@ static bool clear_stale(const struct sockaddr_un *address, struct error *err)
     if (!S_ISSOCK(there.st_mode))
         return fail(err, ERROR_CONFIG, "%s: is there and is no socket", path);
     int probe = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    bool stale = connect(probe, (const struct sockaddr *)address, sizeof *address) &&
-                 errno == ECONNREFUSED;
+    bool stale =
+        connect(probe, (const struct sockaddr *)address, sizeof *address) && errno == ECONNREFUSED;
     close(probe);
     if (!stale)
         return fail(err, ERROR_CONFIG, "%s: somebody already listens there", path);

@@ -26,11 +26,12 @@
 #define CONTROL_QUIT "quit"
 
 // boothsim: what a person does in a real booth.
-#define CONTROL_LAMP "lamp"   // name or "none", [level 0..1.2]
-#define CONTROL_TILT "tilt"   // deg
-#define CONTROL_HEAD "head"   // eye_m [x, y, z] in booth frame
-#define CONTROL_AIM "aim"     // target "screen" x_px y_px | "ceiling" x_m z_m
-#define CONTROL_TRUTH "truth" // reflectance {nm, values} or flat -> XYZ a physical sample would show
+#define CONTROL_LAMP "lamp" // name or "none", [level 0..1.2]
+#define CONTROL_TILT "tilt" // deg
+#define CONTROL_HEAD "head" // eye_m [x, y, z] in booth frame
+#define CONTROL_AIM "aim"   // target "screen" x_px y_px | "ceiling" x_m z_m
+#define CONTROL_TRUTH                                                                              \
+    "truth" // reflectance {nm, values} or flat -> XYZ a physical sample would show
 #define CONTROL_FAULT "fault" // instrument, kind
 
 struct control_client;
@@ -51,7 +52,8 @@ json_t *control_call(struct control_client *client, json_t *request, int timeout
 
 // A server's side. handle returns a new reply object (without "ok"), or NULL
 // with err filled. It runs on the thread that calls control_serve.
-typedef json_t *control_handler(void *context, const char *what, json_t *request, struct error *err);
+typedef json_t *control_handler(void *context, const char *what, json_t *request,
+                                struct error *err);
 
 struct control_server;
 

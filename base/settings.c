@@ -83,8 +83,8 @@ static bool vector(const struct setting *row, const char *text, double *values, 
     double x;
     for (size_t i = 0; i < row->size; i++) {
         if (!*rest)
-            return fail(err, ERROR_CONFIG, "%s: \"%.80s\" has %zu numbers instead of %zu", row->name,
-                        text, i, row->size);
+            return fail(err, ERROR_CONFIG, "%s: \"%.80s\" has %zu numbers instead of %zu",
+                        row->name, text, i, row->size);
         if (!number(row, &rest, &x, err))
             return false;
     }
@@ -117,15 +117,15 @@ bool settings_set(const struct setting *rows, void *target, const char *name, co
     case SETTING_INT:
         return whole(row, text, field, err);
     case SETTING_BOOL:
-        if (!choice(&(struct setting){.name = name, .choices = (const char *[]){"no", "yes", NULL}}, text,
-                    &i, err))
+        if (!choice(&(struct setting){.name = name, .choices = (const char *[]){"no", "yes", NULL}},
+                    text, &i, err))
             return false;
         *(bool *)field = i;
         return true;
     case SETTING_TEXT:
         if (strlen(text) >= row->size)
-            return fail(err, ERROR_CONFIG, "%s: \"%.40s\" is longer than %zu characters", name, text,
-                        row->size - 1);
+            return fail(err, ERROR_CONFIG, "%s: \"%.40s\" is longer than %zu characters", name,
+                        text, row->size - 1);
         strcpy(field, text);
         return true;
     case SETTING_ENUM:
@@ -171,11 +171,13 @@ void settings_describe(const struct settings_section *section, FILE *out)
     for (const struct setting *row = section->rows; row->name; row++) {
         fprintf(out, "# %s", row->help);
         if (row->type == SETTING_DOUBLE || row->type == SETTING_INT || row->type == SETTING_VECTOR)
-            fprintf(out, " %.9g..%.9g%s%s", row->least, row->most, *row->unit ? " " : "", row->unit);
+            fprintf(out, " %.9g..%.9g%s%s", row->least, row->most, *row->unit ? " " : "",
+                    row->unit);
         if (row->type == SETTING_ENUM)
             for (int i = 0; row->choices[i]; i++)
                 fprintf(out, "%s%s", i ? " | " : " ", row->choices[i]);
-        fprintf(out, "\n%s%s = %s\n", row->preset ? "# " : "", row->name, row->preset ? row->preset : "");
+        fprintf(out, "\n%s%s = %s\n", row->preset ? "# " : "", row->name,
+                row->preset ? row->preset : "");
     }
 }
 

@@ -62,8 +62,7 @@ static bool is(const struct token *token, const char *word)
 
 static bool begins(const struct token *token, const char *word)
 {
-    return !token->quoted && token->size > strlen(word) &&
-           !memcmp(token->text, word, strlen(word));
+    return !token->quoted && token->size > strlen(word) && !memcmp(token->text, word, strlen(word));
 }
 
 static const char *shown_token(const struct token *token, char shown[TEXT_SHOWN])
@@ -204,8 +203,8 @@ static bool read_promise(struct reader *r, struct promise *promise, size_t most)
         return false;
     if (text_number(r->token.text, r->token.size, &count) != TEXT_NUMBER || count != floor(count) ||
         count < 1 || count > most)
-        return fail(r->err, ERROR_DATA, "%s:%d: %s: \"%s\"; allowed: a whole number 1..%zu", r->path,
-                    name.line, shown[0], shown_token(&r->token, shown[1]), most);
+        return fail(r->err, ERROR_DATA, "%s:%d: %s: \"%s\"; allowed: a whole number 1..%zu",
+                    r->path, name.line, shown[0], shown_token(&r->token, shown[1]), most);
     *promise = (struct promise){(size_t)count, name.line};
     return true;
 }
@@ -216,13 +215,11 @@ static bool add_keyword(struct reader *r, struct cgats *file, const struct token
     if (file->keyword_count == KEYWORDS_MOST)
         return fail(r->err, ERROR_DATA, "%s:%d: more than %d keywords", r->path, r->line,
                     KEYWORDS_MOST);
-    struct cgats_keyword *more =
-        realloc(file->keywords, (file->keyword_count + 1) * sizeof *more);
+    struct cgats_keyword *more = realloc(file->keywords, (file->keyword_count + 1) * sizeof *more);
     if (!more)
         return out_of_memory(r);
     file->keywords = more;
-    struct cgats_keyword k = {strndup(name->text, name->size),
-                              copy_text(&r->token), name->line};
+    struct cgats_keyword k = {strndup(name->text, name->size), copy_text(&r->token), name->line};
     more[file->keyword_count++] = k;
     if (!k.name || !k.value)
         return out_of_memory(r);
@@ -362,8 +359,7 @@ static bool add_cell(struct reader *r, struct building *b)
             t->labels[t->rows] = NULL;
         t->lines[t->rows++] = token->line;
     }
-    if ((int)column == b->label_column &&
-        !(t->labels[t->rows - 1] = copy_text(token)))
+    if ((int)column == b->label_column && !(t->labels[t->rows - 1] = copy_text(token)))
         return out_of_memory(r);
     char shown[TEXT_SHOWN];
     double *value = &t->values[b->cells++];
@@ -383,9 +379,10 @@ static bool check_promises(struct reader *r, const struct building *b)
     if (b->odd_line)
         snprintf(hint, sizeof hint, "; rows leave their lines at line %d", b->odd_line);
     if (b->cells % t->columns)
-        return fail(r->err, ERROR_DATA, "%s:%d: BEGIN_DATA..END_DATA holds %zu cells, which is not "
-                    "a multiple of the %zu fields%s", r->path, r->token.line, b->cells, t->columns,
-                    hint);
+        return fail(r->err, ERROR_DATA,
+                    "%s:%d: BEGIN_DATA..END_DATA holds %zu cells, which is not "
+                    "a multiple of the %zu fields%s",
+                    r->path, r->token.line, b->cells, t->columns, hint);
     if (b->sets.line && b->sets.count != t->rows)
         return fail(r->err, ERROR_DATA,
                     "%s:%d: NUMBER_OF_SETS: %zu contradicts the %zu rows of the data%s", r->path,

@@ -19,17 +19,17 @@ static bool is_one_of(const char *name, const char *const *list)
 static bool is_standard_keyword(const char *name)
 {
     static const char *const STANDARD[] = {
-        "ORIGINATOR", "DESCRIPTOR", "CREATED", "MANUFACTURER", "PROD_DATE", "SERIAL", "MATERIAL",
-        "INSTRUMENTATION", "MEASUREMENT_SOURCE", "PRINT_CONDITIONS", NULL};
+        "ORIGINATOR",         "DESCRIPTOR",       "CREATED",  "MANUFACTURER",
+        "PROD_DATE",          "SERIAL",           "MATERIAL", "INSTRUMENTATION",
+        "MEASUREMENT_SOURCE", "PRINT_CONDITIONS", NULL};
     return is_one_of(name, STANDARD);
 }
 
 static bool is_standard_field(const char *name)
 {
-    static const char *const STANDARD[] = {"SAMPLE_ID", "STRING", "RGB_R", "RGB_G", "RGB_B",
-                                           "XYZ_X", "XYZ_Y", "XYZ_Z", "XYY_X", "XYY_Y",
-                                           "XYY_CAPY", "LAB_L", "LAB_A", "LAB_B", "LAB_C",
-                                           "LAB_H", "LAB_DE", NULL};
+    static const char *const STANDARD[] = {
+        "SAMPLE_ID", "STRING",   "RGB_R", "RGB_G", "RGB_B", "XYZ_X", "XYZ_Y", "XYZ_Z",  "XYY_X",
+        "XYY_Y",     "XYY_CAPY", "LAB_L", "LAB_A", "LAB_B", "LAB_C", "LAB_H", "LAB_DE", NULL};
     return is_one_of(name, STANDARD);
 }
 
@@ -81,9 +81,8 @@ static bool check_cells(const char *path, const struct table *t, struct error *e
             return fail(err, ERROR_RANGE, "%s: label of row %zu is not one line", path, r + 1);
         for (size_t c = 0; c < t->columns; c++)
             if (!is_label(t, c) && !isfinite(table_at(t, r, c)))
-                return fail(err, ERROR_RANGE,
-                            "%s: row %zu, field %s: %g; allowed: a finite number", path, r + 1,
-                            t->names[c], table_at(t, r, c));
+                return fail(err, ERROR_RANGE, "%s: row %zu, field %s: %g; allowed: a finite number",
+                            path, r + 1, t->names[c], table_at(t, r, c));
     }
     return true;
 }

@@ -40,8 +40,8 @@ static bool check_size(int width, int height, int channels, struct error *err)
         return fail(err, ERROR_RANGE, "image of %d channels; allowed: 1..%d", channels,
                     EXR_CHANNELS_MOST);
     if ((size_t)width * height * channels * sizeof(float) > BYTES_MOST)
-        return fail(err, ERROR_RANGE, "image of %d x %d pixels and %d channels is over 4 GiB", width,
-                    height, channels);
+        return fail(err, ERROR_RANGE, "image of %d x %d pixels and %d channels is over 4 GiB",
+                    width, height, channels);
     return true;
 }
 
@@ -140,8 +140,8 @@ static int64_t write_bytes(exr_const_context_t context, void *user, const void *
 {
     const struct stream *stream = user;
     for (uint64_t done = 0; done < size;) {
-        ssize_t n = pwrite(fileno(stream->out), (const char *)buffer + done, size - done,
-                           offset + done);
+        ssize_t n =
+            pwrite(fileno(stream->out), (const char *)buffer + done, size - done, offset + done);
         if (n > 0)
             done += n;
         else if (n == 0 || errno != EINTR)
@@ -171,11 +171,15 @@ static bool malformed(const struct stream *stream, struct error *err)
 static const char *storage_name(exr_storage_t storage)
 {
     switch (storage) {
-    case EXR_STORAGE_SCANLINE: return "scan-line";
-    case EXR_STORAGE_TILED: return "tiled";
+    case EXR_STORAGE_SCANLINE:
+        return "scan-line";
+    case EXR_STORAGE_TILED:
+        return "tiled";
     case EXR_STORAGE_DEEP_SCANLINE:
-    case EXR_STORAGE_DEEP_TILED: return "deep";
-    case EXR_STORAGE_LAST_TYPE: break;
+    case EXR_STORAGE_DEEP_TILED:
+        return "deep";
+    case EXR_STORAGE_LAST_TYPE:
+        break;
     }
     return "unknown";
 }
@@ -187,13 +191,20 @@ static const char *compression_name(exr_compression_t compression)
     case EXR_COMPRESSION_RLE:
     case EXR_COMPRESSION_ZIPS:
     case EXR_COMPRESSION_ZIP:
-    case EXR_COMPRESSION_PIZ: return NULL;
-    case EXR_COMPRESSION_PXR24: return "PXR24";
-    case EXR_COMPRESSION_B44: return "B44";
-    case EXR_COMPRESSION_B44A: return "B44A";
-    case EXR_COMPRESSION_DWAA: return "DWAA";
-    case EXR_COMPRESSION_DWAB: return "DWAB";
-    case EXR_COMPRESSION_LAST_TYPE: break;
+    case EXR_COMPRESSION_PIZ:
+        return NULL;
+    case EXR_COMPRESSION_PXR24:
+        return "PXR24";
+    case EXR_COMPRESSION_B44:
+        return "B44";
+    case EXR_COMPRESSION_B44A:
+        return "B44A";
+    case EXR_COMPRESSION_DWAA:
+        return "DWAA";
+    case EXR_COMPRESSION_DWAB:
+        return "DWAB";
+    case EXR_COMPRESSION_LAST_TYPE:
+        break;
     }
     return "unknown";
 }
@@ -321,8 +332,7 @@ static void aim(exr_coding_channel_info_t *channels, int count, const struct exr
         channel->user_pixel_stride = sizeof(float);
         channel->user_line_stride = image->width * sizeof(float);
         channel->decode_to_ptr =
-            c < 0 ? NULL
-                  : (uint8_t *)(image->pixels + c * plane + (size_t)row * image->width);
+            c < 0 ? NULL : (uint8_t *)(image->pixels + c * plane + (size_t)row * image->width);
     }
 }
 
@@ -366,8 +376,8 @@ static bool load(struct stream *stream, struct exr *image, struct error *err)
         return malformed(stream, err);
     exr_decode_pipeline_t pipeline = EXR_DECODE_PIPELINE_INITIALIZER;
     int first_line = 0;
-    bool ok = check_kind(context, stream, err) &&
-              take_header(context, stream, image, &first_line, err);
+    bool ok =
+        check_kind(context, stream, err) && take_header(context, stream, image, &first_line, err);
     if (ok && !decode(context, &pipeline, image, first_line))
         ok = malformed(stream, err);
     exr_decoding_destroy(context, &pipeline);

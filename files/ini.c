@@ -64,13 +64,14 @@ static bool unknown_section(const struct reading *r, const char *name, size_t si
     for (const struct settings_section *s = r->sections; s->name; s++)
         list(allowed, sizeof allowed, s->name);
     if (!size)
-        return fail(err, ERROR_CONFIG, "a setting before the first [section]; allowed: %s", allowed);
+        return fail(err, ERROR_CONFIG, "a setting before the first [section]; allowed: %s",
+                    allowed);
     return fail(err, ERROR_CONFIG, "[%s]: no such section; allowed: %s",
                 text_shown(shown, name, size), allowed);
 }
 
-static bool unknown_key(const struct settings_section *section, const char *key,
-                        const char *value, struct error *err)
+static bool unknown_key(const struct settings_section *section, const char *key, const char *value,
+                        struct error *err)
 {
     char allowed[256] = "", shown[2][TEXT_SHOWN];
     for (const struct setting *row = section->rows; row->name; row++)
@@ -84,8 +85,7 @@ static bool take(struct reading *r, const char *name, const char *key, const cha
                  struct error *err)
 {
     size_t first;
-    const struct settings_section *section =
-        find_section(r->sections, name, strlen(name), &first);
+    const struct settings_section *section = find_section(r->sections, name, strlen(name), &first);
     if (!section)
         return unknown_section(r, name, strlen(name), err);
     const struct setting *row = settings_find(section->rows, key);

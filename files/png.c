@@ -46,7 +46,8 @@ static bool write_rows(png_structp png, png_infop info, FILE *out, int width, in
 static bool write_png(FILE *out, int width, int height, const uint8_t *rgb,
                       struct complaint *complaint)
 {
-    png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, complaint, on_error, on_warning);
+    png_structp png =
+        png_create_write_struct(PNG_LIBPNG_VER_STRING, complaint, on_error, on_warning);
     png_infop info = png ? png_create_info_struct(png) : NULL;
     bool ok = info && write_rows(png, info, out, width, height, rgb, complaint);
     png_destroy_write_struct(&png, &info);

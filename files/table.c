@@ -64,8 +64,7 @@ static bool separates(const struct csv *csv, char c)
 // Blanks that mean nothing: those before a cell, but no separating tab.
 static void skip_padding(struct csv *csv)
 {
-    while (csv->at < csv->stop && blank(*csv->at) &&
-           !(csv->separator == '\t' && *csv->at == '\t'))
+    while (csv->at < csv->stop && blank(*csv->at) && !(csv->separator == '\t' && *csv->at == '\t'))
         csv->at++;
 }
 

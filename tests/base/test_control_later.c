@@ -37,8 +37,8 @@ static json_t *handle(void *context, const char *what, json_t *request, struct e
         struct error no = {0};
         if (json_object_get(request, "fail"))
             fail(&no, ERROR_RETRY, "not today");
-        control_answer(s->server, s->ticket,
-                       no.code ? NULL : json_pack("{s:s}", "said", "late"), &no);
+        control_answer(s->server, s->ticket, no.code ? NULL : json_pack("{s:s}", "said", "late"),
+                       &no);
         return json_object();
     }
     if (!strcmp(what, "quick"))

@@ -74,7 +74,8 @@ static void an_error_may_be_its_own_argument(void **state)
 static void every_code_has_its_name(void **state)
 {
     (void)state;
-    static const char *const NAMES[] = {"none", "retry", "gone", "data", "range", "config", "system"};
+    static const char *const NAMES[] = {"none",  "retry",  "gone",  "data",
+                                        "range", "config", "system"};
     for (int i = ERROR_NONE; i <= ERROR_SYSTEM; i++)
         assert_string_equal(error_code_name(i), NAMES[i]);
 }

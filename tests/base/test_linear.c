@@ -67,8 +67,10 @@ static void the_inverse_of_a_published_matrix_is_the_published_inverse(void **st
     (void)state;
     // IEC 61966-2-1 gives sRGB's matrix and its inverse to four decimals.
     const double FOUR_DECIMALS = 5e-4;
-    struct mat3 srgb = {{{0.4124, 0.3576, 0.1805}, {0.2126, 0.7152, 0.0722}, {0.0193, 0.1192, 0.9505}}};
-    struct mat3 back = {{{3.2406, -1.5372, -0.4986}, {-0.9689, 1.8758, 0.0415}, {0.0557, -0.2040, 1.0570}}};
+    struct mat3 srgb = {
+        {{0.4124, 0.3576, 0.1805}, {0.2126, 0.7152, 0.0722}, {0.0193, 0.1192, 0.9505}}};
+    struct mat3 back = {
+        {{3.2406, -1.5372, -0.4986}, {-0.9689, 1.8758, 0.0415}, {0.0557, -0.2040, 1.0570}}};
     struct mat3 inverse;
     assert_true(mat3_invert(srgb, &inverse));
     assert_same(inverse, back, FOUR_DECIMALS);
@@ -105,7 +107,8 @@ static void the_hilbert_matrix_has_its_published_condition(void **state)
 {
     (void)state;
     // Todd 1954; the 3x3 Hilbert matrix, 2-norm.
-    struct mat3 hilbert = {{{1, 1.0 / 2, 1.0 / 3}, {1.0 / 2, 1.0 / 3, 1.0 / 4}, {1.0 / 3, 1.0 / 4, 1.0 / 5}}};
+    struct mat3 hilbert = {
+        {{1, 1.0 / 2, 1.0 / 3}, {1.0 / 2, 1.0 / 3, 1.0 / 4}, {1.0 / 3, 1.0 / 4, 1.0 / 5}}};
     assert_near(mat3_condition(hilbert), 524.0567775860608, HILBERT_ROUNDING * 524);
 }
 

@@ -31,14 +31,16 @@ struct probe {
 #define FIELD(field) SETTING_FIELD(struct probe, field)
 
 static const struct setting ROWS[] = {
-    {"width_m", SETTING_DOUBLE, FIELD(width_m), 0, 0.01, 10, "m", NULL, NULL, "Width of the screen."},
+    {"width_m", SETTING_DOUBLE, FIELD(width_m), 0, 0.01, 10, "m", NULL, NULL,
+     "Width of the screen."},
     {"integration_us", SETTING_INT, FIELD(integration_us), 0, 1000, 65535000, "us", NULL, "100000",
      "Integration time."},
     {"emulated", SETTING_BOOL, FIELD(emulated), 0, 0, 0, "", NULL, "no", "Is it emulated?"},
     {"name", SETTING_TEXT, FIELD(name), SETTING_SIZE(struct probe, name), 0, 0, "", NULL, "booth",
      "Its name."},
     {"mode", SETTING_ENUM, FIELD(mode), 0, 0, 0, "", MODES, "bands", "Spectral mode."},
-    {"eye_m", SETTING_VECTOR, FIELD(eye_m), 3, -5, 5, "m", NULL, "0 0.55 0.65", "Where the eye is."},
+    {"eye_m", SETTING_VECTOR, FIELD(eye_m), 3, -5, 5, "m", NULL, "0 0.55 0.65",
+     "Where the eye is."},
     {"curve", SETTING_VECTOR, FIELD(curve), CURVE, 0, 1, "", NULL, NULL, "A long one."},
     {0}};
 
@@ -145,8 +147,12 @@ static void an_unknown_setting_is_refused(void **state)
 
 static struct probe filled(void)
 {
-    struct probe p = {.width_m = 0.1, .integration_us = 1234, .emulated = true, .name = "a b",
-                      .mode = MODE_PRODUCT, .eye_m = {1.0 / 3, -4.999999999999999, 5e-324}};
+    struct probe p = {.width_m = 0.1,
+                      .integration_us = 1234,
+                      .emulated = true,
+                      .name = "a b",
+                      .mode = MODE_PRODUCT,
+                      .eye_m = {1.0 / 3, -4.999999999999999, 5e-324}};
     for (int i = 0; i < CURVE; i++)
         p.curve[i] = i / (CURVE - 1.0);
     return p;
@@ -198,7 +204,8 @@ static void a_description_names_help_range_unit_and_preset(void **state)
     settings_describe(&(struct settings_section){"probe", ROWS, NULL}, out);
     fclose(out);
     assert_non_null(strstr(text, "[probe]\n# Width of the screen. 0.01..10 m\nwidth_m = \n"));
-    assert_non_null(strstr(text, "# Integration time. 1000..65535000 us\n# integration_us = 100000\n"));
+    assert_non_null(
+        strstr(text, "# Integration time. 1000..65535000 us\n# integration_us = 100000\n"));
     assert_non_null(strstr(text, "# Spectral mode. full | bands | product\n# mode = bands\n"));
     free(text);
 }

@@ -64,7 +64,8 @@ static void attack_cgats(const char *bytes, size_t size)
     if (cgats_load(put("t.ti3", bytes, size), &file, &err)) {
         assert_true(file.table.rows > 0 && file.table.columns > 0);
         for (size_t c = 0; c < file.table.columns; c++)
-            for (size_t r = 0; strncmp(file.table.names[c], "SAMPLE", 6) && r < file.table.rows; r++)
+            for (size_t r = 0; strncmp(file.table.names[c], "SAMPLE", 6) && r < file.table.rows;
+                 r++)
                 assert_true(isfinite(table_at(&file.table, r, c)) ||
                             !strcmp(file.table.names[c], "STRING"));
     } else {
@@ -87,7 +88,8 @@ static void attack_ini(const char *bytes, size_t size)
     static const struct setting ROWS[] = {
         {"width_m", SETTING_DOUBLE, SETTING_FIELD(struct screen, width_m), 0, 0.01, 10, "m", NULL,
          NULL, "Width."},
-        {"bits", SETTING_INT, SETTING_FIELD(struct screen, bits), 0, 6, 16, "", NULL, "8", "Depth."},
+        {"bits", SETTING_INT, SETTING_FIELD(struct screen, bits), 0, 6, 16, "", NULL, "8",
+         "Depth."},
         {"name", SETTING_TEXT, SETTING_FIELD(struct screen, name),
          SETTING_SIZE(struct screen, name), 0, 0, "", NULL, "panel", "Name."},
         {"eye_m", SETTING_VECTOR, SETTING_FIELD(struct screen, eye_m), 3, -5, 5, "m", NULL,
@@ -188,14 +190,16 @@ static void cgats_files_stand(void **state)
                 "BEGIN_DATA_FORMAT\nSAMPLE_ID RGB_R RGB_G RGB_B\nEND_DATA_FORMAT\n"
                 "NUMBER_OF_SETS 3\nBEGIN_DATA\n1 0 50 100\n2 1e1\n60.5 -1\n\"3 b\" 1 2 3\n"
                 "END_DATA\nCAL\nNUMBER_OF_FIELDS 1\nBEGIN_DATA_FORMAT\nRGB_I\nEND_DATA_FORMAT\n"
-                "NUMBER_OF_SETS 2\nBEGIN_DATA\n0 1\nEND_DATA\n", attack_cgats);
+                "NUMBER_OF_SETS 2\nBEGIN_DATA\n0 1\nEND_DATA\n",
+                attack_cgats);
 }
 
 static void settings_files_stand(void **state)
 {
     (void)state;
     attack_text("\xef\xbb\xbf# booth\n[screen]\nwidth_m = 0.52\r\n; depth\n  bits: 10\n"
-                "name = EIZO CG ; #1 \xc3\xa9\neye_m = 0 0.55\t-0.65\n", attack_ini);
+                "name = EIZO CG ; #1 \xc3\xa9\neye_m = 0 0.55\t-0.65\n",
+                attack_ini);
 }
 
 static char *an_image(size_t *size)

@@ -116,7 +116,8 @@ static void all_cells_may_stand_on_one_line_or_on_one_each(void **state)
     (void)state;
     struct cgats file;
     good("SPECT\nNUMBER_OF_FIELDS 2\nBEGIN_DATA_FORMAT A B END_DATA_FORMAT\nNUMBER_OF_SETS 2\n"
-         "BEGIN_DATA 1 2 3 4 END_DATA", &file);
+         "BEGIN_DATA 1 2 3 4 END_DATA",
+         &file);
     assert_true(table_at(&file.table, 1, 0) == 3);
     assert_null(file.table.labels);
     cgats_fini(&file);
@@ -131,7 +132,8 @@ static void a_name_is_the_label_where_there_is_no_id(void **state)
     (void)state;
     struct cgats file;
     good("CTI3\nBEGIN_DATA_FORMAT\nA SAMPLE_NAME\nEND_DATA_FORMAT\nBEGIN_DATA\n1 \"dark skin\"\n"
-         "2 red\nEND_DATA\n", &file);
+         "2 red\nEND_DATA\n",
+         &file);
     assert_string_equal(file.table.labels[0], "dark skin");
     assert_string_equal(file.table.labels[1], "red");
     cgats_fini(&file);
@@ -153,8 +155,10 @@ static void later_tables_are_checked_and_left_out(void **state)
     bad(text, "a.ti3:34: field RGB_R: \"x\" is not a number; allowed: a finite number");
     snprintf(text, sizeof text, "%sCAL\n", EXAMPLE);
     bad(text, "a.ti3:26: the file ends before BEGIN_DATA");
-    snprintf(text, sizeof text, "%.*s%s", 0, "", "SPECT\nBEGIN_DATA_FORMAT A END_DATA_FORMAT\n"
-             "BEGIN_DATA 1 END_DATA\nCAL\nBEGIN_DATA_FORMAT A END_DATA_FORMAT\nBEGIN_DATA 1 END_DATA\n");
+    snprintf(
+        text, sizeof text, "%.*s%s", 0, "",
+        "SPECT\nBEGIN_DATA_FORMAT A END_DATA_FORMAT\n"
+        "BEGIN_DATA 1 END_DATA\nCAL\nBEGIN_DATA_FORMAT A END_DATA_FORMAT\nBEGIN_DATA 1 END_DATA\n");
     bad(text, "a.ti3:4: a second table; allowed: one in a SPECT file");
 }
 
@@ -163,8 +167,9 @@ static void a_missing_identifier_is_refused(void **state)
     (void)state;
     bad("", "a.ti3:1: the file ends before an identifier");
     bad("# nothing\n\n", "a.ti3:3: the file ends before an identifier");
-    bad("DESCRIPTOR \"x\"\n", "a.ti3:1: \"DESCRIPTOR\"; allowed: an identifier such as CTI3 or SPECT "
-                              "on its own line");
+    bad("DESCRIPTOR \"x\"\n",
+        "a.ti3:1: \"DESCRIPTOR\"; allowed: an identifier such as CTI3 or SPECT "
+        "on its own line");
     bad("380,1\n390,2\n", "a.ti3:1: \"380,1\"; allowed: an identifier such as CTI3 or SPECT on its "
                           "own line");
     bad("\"CTI3\"\n", "a.ti3:1: \"CTI3\"; allowed: an identifier such as CTI3 or SPECT on its own "
@@ -217,10 +222,12 @@ static void rows_with_a_cell_too_few_or_too_many_are_refused_with_their_line(voi
 {
     (void)state;
     bad("CTI3\nBEGIN_DATA_FORMAT\nA B\nEND_DATA_FORMAT\nBEGIN_DATA\n1 2\n3\n5 6\nEND_DATA\n",
-        "a.ti3:9: BEGIN_DATA..END_DATA holds 5 cells, which is not a multiple of the 2 fields; rows "
+        "a.ti3:9: BEGIN_DATA..END_DATA holds 5 cells, which is not a multiple of the 2 fields; "
+        "rows "
         "leave their lines at line 8");
     bad("CTI3\nBEGIN_DATA_FORMAT\nA B\nEND_DATA_FORMAT\nBEGIN_DATA\n1 2\n3 4 5\nEND_DATA\n",
-        "a.ti3:8: BEGIN_DATA..END_DATA holds 5 cells, which is not a multiple of the 2 fields; rows "
+        "a.ti3:8: BEGIN_DATA..END_DATA holds 5 cells, which is not a multiple of the 2 fields; "
+        "rows "
         "leave their lines at line 7");
     bad("CTI3\nBEGIN_DATA_FORMAT\nA B\nEND_DATA_FORMAT\nBEGIN_DATA\nEND_DATA\n",
         "a.ti3:6: BEGIN_DATA..END_DATA holds no row");
@@ -231,8 +238,7 @@ static void a_field_given_twice_or_none_at_all_is_refused(void **state)
     (void)state;
     bad(edited("RGB_G RGB_B", "RGB_R RGB_B"),
         "a.ti3:15: field RGB_R: given a second time; allowed: once");
-    bad("CTI3\nBEGIN_DATA_FORMAT\nEND_DATA_FORMAT\n",
-        "a.ti3:2: BEGIN_DATA_FORMAT: names no field");
+    bad("CTI3\nBEGIN_DATA_FORMAT\nEND_DATA_FORMAT\n", "a.ti3:2: BEGIN_DATA_FORMAT: names no field");
     bad("CTI3\nBEGIN_DATA\n1\nEND_DATA\n", "a.ti3:2: BEGIN_DATA: stands before BEGIN_DATA_FORMAT");
     bad("CTI3\nBEGIN_DATA_FORMAT\n1 2\nEND_DATA_FORMAT\n", "a.ti3:3: \"1\" is no field name");
 }
@@ -244,8 +250,9 @@ static void a_cell_that_is_no_finite_number_is_refused_with_its_field(void **sta
                                "number");
     bad(edited("60.5", "60,5"), "a.ti3:22: field RGB_G: \"60,5\" has a decimal comma; allowed: a "
                                 "number with a decimal point");
-    bad(edited("60.5", "1e999"), "a.ti3:22: field RGB_G: \"1e999\" is not finite; allowed: a finite "
-                                 "number");
+    bad(edited("60.5", "1e999"),
+        "a.ti3:22: field RGB_G: \"1e999\" is not finite; allowed: a finite "
+        "number");
     bad(edited("60.5", "\"\""), "a.ti3:22: field RGB_G: \"\" is empty; allowed: a finite number");
     bad(edited("60.5", "END"), "a.ti3:22: field RGB_G: \"END\" is not a number; allowed: a finite "
                                "number");
@@ -321,9 +328,15 @@ static void what_is_saved_loads_to_the_same_bits(void **state)
     double values[] = {0.1, 1.0 / 3, -5e-324, 1.7976931348623157e308, 100, 123456.789};
     struct cgats_keyword keywords[] = {{(char[]){"DESCRIPTOR"}, (char[]){"say \"hi\" # no"}, 0},
                                        {(char[]){"COLOR_REP"}, (char[]){""}, 0}};
-    struct cgats file = {.identifier = "CTI3", .keyword_count = 2, .keywords = keywords,
-                         .table = {.columns = 2, .rows = 3, .names = names, .values = values,
-                                   .labels = labels}}, back, twice;
+    struct cgats file = {.identifier = "CTI3",
+                         .keyword_count = 2,
+                         .keywords = keywords,
+                         .table = {.columns = 2,
+                                   .rows = 3,
+                                   .names = names,
+                                   .values = values,
+                                   .labels = labels}},
+                 back, twice;
     struct error err = {0};
     assert_true(cgats_save(at("b.ti3"), &file, &err));
     assert_true(cgats_load(at("b.ti3"), &back, &err));

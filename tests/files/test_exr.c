@@ -139,8 +139,8 @@ static void a_seventeenth_attribute_is_left_out(void **state)
 static void sizes_out_of_range_are_refused(void **state)
 {
     (void)state;
-    static const int BAD[][3] = {{0, 1, 1}, {1, 0, 1}, {-5, 1, 1}, {16385, 1, 1}, {1, 16385, 1},
-                                 {1, 1, 0}, {1, 1, 65}, {16384, 16384, 5}};
+    static const int BAD[][3] = {{0, 1, 1},     {1, 0, 1}, {-5, 1, 1}, {16385, 1, 1},
+                                 {1, 16385, 1}, {1, 1, 0}, {1, 1, 65}, {16384, 16384, 5}};
     for (size_t i = 0; i < sizeof BAD / sizeof *BAD; i++) {
         struct exr image;
         struct error err = {0};
@@ -208,7 +208,8 @@ static void write_foreign_lines(exr_context_t context, const struct foreign *f, 
     for (int row = 0; row < H; row += chunk.height) {
         assert_int_equal(exr_write_scanline_chunk_info(context, 0, f->first_y + row, &chunk), 0);
         assert_int_equal(row ? exr_encoding_update(context, 0, &chunk, &pipeline)
-                             : exr_encoding_initialize(context, 0, &chunk, &pipeline), 0);
+                             : exr_encoding_initialize(context, 0, &chunk, &pipeline),
+                         0);
         exr_coding_channel_info_t *channel = pipeline.channels;
         channel->user_bytes_per_element = f->type == EXR_PIXEL_UINT ? 4 : sizeof(float);
         channel->user_data_type = f->type == EXR_PIXEL_UINT ? EXR_PIXEL_UINT : EXR_PIXEL_FLOAT;
@@ -226,7 +227,8 @@ static const char *write_foreign(struct foreign f)
 {
     exr_context_t context;
     exr_context_initializer_t init = EXR_DEFAULT_CONTEXT_INITIALIZER;
-    exr_attr_box2i_t window = {{{{f.first_x, f.first_y}}}, {{{f.first_x + W - 1, f.first_y + H - 1}}}};
+    exr_attr_box2i_t window = {{{{f.first_x, f.first_y}}},
+                               {{{f.first_x + W - 1, f.first_y + H - 1}}}};
     exr_attr_v2f_t centre = {{{0, 0}}};
     float pixels[W * H];
     for (int i = 0; i < W * H; i++)
@@ -238,13 +240,15 @@ static const char *write_foreign(struct foreign f)
         int part;
         snprintf(name, sizeof name, "part%d", p);
         assert_int_equal(exr_add_part(context, name, f.storage, &part), 0);
-        assert_int_equal(exr_initialize_required_attr(context, part, &window, &window, 1, &centre, 1,
-                                                      EXR_LINEORDER_INCREASING_Y, f.compression), 0);
+        assert_int_equal(exr_initialize_required_attr(context, part, &window, &window, 1, &centre,
+                                                      1, EXR_LINEORDER_INCREASING_Y, f.compression),
+                         0);
         if (f.storage == EXR_STORAGE_TILED)
             assert_int_equal(exr_set_tile_descriptor(context, part, 16, 16, EXR_TILE_ONE_LEVEL,
-                                                     EXR_TILE_ROUND_DOWN), 0);
-        assert_int_equal(exr_add_channel(context, part, "Y", f.type, EXR_PERCEPTUALLY_LINEAR,
-                                         1, 1), 0);
+                                                     EXR_TILE_ROUND_DOWN),
+                             0);
+        assert_int_equal(exr_add_channel(context, part, "Y", f.type, EXR_PERCEPTUALLY_LINEAR, 1, 1),
+                         0);
     }
     assert_int_equal(exr_write_header(context), 0);
     if (f.parts == 1 && f.storage == EXR_STORAGE_SCANLINE) {
@@ -261,8 +265,8 @@ static const char *write_foreign(struct foreign f)
     return at("f.exr");
 }
 
-static const struct foreign PLAIN = {EXR_COMPRESSION_NONE, EXR_STORAGE_SCANLINE, EXR_PIXEL_FLOAT,
-                                     1, 0, 0, 0};
+static const struct foreign PLAIN = {
+    EXR_COMPRESSION_NONE, EXR_STORAGE_SCANLINE, EXR_PIXEL_FLOAT, 1, 0, 0, 0};
 
 static void assert_reads_exactly(struct foreign f)
 {
@@ -294,7 +298,8 @@ static void every_lossless_compression_is_read_exactly(void **state)
 {
     (void)state;
     struct foreign f = PLAIN;
-    for (f.compression = EXR_COMPRESSION_NONE; f.compression <= EXR_COMPRESSION_PIZ; f.compression++)
+    for (f.compression = EXR_COMPRESSION_NONE; f.compression <= EXR_COMPRESSION_PIZ;
+         f.compression++)
         for (f.type = EXR_PIXEL_HALF; f.type <= EXR_PIXEL_FLOAT; f.type++)
             assert_reads_exactly(f);
 }

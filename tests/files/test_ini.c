@@ -36,10 +36,9 @@ struct stand {
     double eye_m[3];
 };
 
-static const struct setting STAND[] = {
-    {"eye_m", SETTING_VECTOR, SETTING_FIELD(struct stand, eye_m), 3, -5, 5, "m", NULL, "0 0.55 0.65",
-     "Where the eye is."},
-    {0}};
+static const struct setting STAND[] = {{"eye_m", SETTING_VECTOR, SETTING_FIELD(struct stand, eye_m),
+                                        3, -5, 5, "m", NULL, "0 0.55 0.65", "Where the eye is."},
+                                       {0}};
 
 struct both {
     struct screen screen;
@@ -145,8 +144,7 @@ static void an_unknown_key_is_named_with_those_allowed(void **state)
     (void)state;
     bad("[screen]\nwidth_m = 1\nwidht_m = 2\n", "a.ini:3: [screen] widht_m = 2: no such setting; "
                                                 "allowed: width_m, bits, name, kind");
-    bad("[stand]\nwidth_m = 1\n",
-        "a.ini:2: [stand] width_m = 1: no such setting; allowed: eye_m");
+    bad("[stand]\nwidth_m = 1\n", "a.ini:2: [stand] width_m = 1: no such setting; allowed: eye_m");
     bad("[screen]\n= 1\n",
         "a.ini:2: [screen]  = 1: no such setting; allowed: width_m, bits, name, kind");
 }
@@ -158,8 +156,7 @@ static void an_unknown_section_is_refused_even_when_empty(void **state)
         "a.ini:3: [scren]: no such section; allowed: screen, stand");
     bad("[scren]\nwidth_m = 1\n", "a.ini:1: [scren]: no such section; allowed: screen, stand");
     bad("[]\n", "a.ini:1: [?]: no such section; allowed: screen, stand");
-    bad("width_m = 1\n",
-        "a.ini:1: a setting before the first [section]; allowed: screen, stand");
+    bad("width_m = 1\n", "a.ini:1: a setting before the first [section]; allowed: screen, stand");
 }
 
 static void nothing_may_be_given_twice(void **state)
@@ -255,8 +252,8 @@ static void what_is_saved_loads_to_the_same_values(void **state)
 static void what_would_not_load_is_not_saved(void **state)
 {
     (void)state;
-    static const struct screen BAD[] = {{NAN, 8, "x", 0}, {1, 5, "x", 0}, {1, 8, "a\nbits = 9", 0},
-                                        {1, 8, " x", 0}, {1, 8, "x ", 0}, {1, 8, "\xff", 0}};
+    static const struct screen BAD[] = {{NAN, 8, "x", 0}, {1, 5, "x", 0},  {1, 8, "a\nbits = 9", 0},
+                                        {1, 8, " x", 0},  {1, 8, "x ", 0}, {1, 8, "\xff", 0}};
     put_text("c.ini", "old");
     for (size_t i = 0; i < sizeof BAD / sizeof *BAD; i++) {
         struct screen screen = BAD[i];

@@ -138,8 +138,8 @@ static void what_is_not_finite_is_refused(void **state)
 static void huge_and_tiny_numbers_that_a_double_holds_are_kept(void **state)
 {
     (void)state;
-    struct table t = good("1.7976931348623157e308 4.9e-324 1e-400 123456789012345678901234567890",
-                          4, 1);
+    struct table t =
+        good("1.7976931348623157e308 4.9e-324 1e-400 123456789012345678901234567890", 4, 1);
     assert_true(table_at(&t, 0, 0) == 1.7976931348623157e308);
     assert_true(table_at(&t, 0, 1) == 4.9e-324);
     assert_true(table_at(&t, 0, 2) == 0);
@@ -253,7 +253,8 @@ static void an_error_in_a_file_names_the_file(void **state)
     struct table t;
     struct error err = {0};
     assert_false(csv_load(put_text("a.csv", "1 2\n3 x\n"), &t, &err));
-    assert_complaint(err.text, "a.csv:2: column 2: \"x\" is not a number; allowed: a finite number");
+    assert_complaint(err.text,
+                     "a.csv:2: column 2: \"x\" is not a number; allowed: a finite number");
     assert_true(csv_load(put_text("b.csv", "1 2\n3 4\n"), &t, &err));
     assert_string_equal(t.path, at("b.csv"));
     table_fini(&t);

@@ -172,8 +172,8 @@ static bool save_long_cgats(const char *path, struct error *err)
 {
     char name[] = "RGB_R", *names[] = {name};
     double values[3000] = {0};
-    struct cgats file = {.identifier = "CTI3", .table = {.columns = 1, .rows = 3000,
-                                                         .names = names, .values = values}};
+    struct cgats file = {.identifier = "CTI3",
+                         .table = {.columns = 1, .rows = 3000, .names = names, .values = values}};
     for (int i = 0; i < 3000; i++)
         values[i] = i / 7.0;
     return cgats_save(path, &file, err);
