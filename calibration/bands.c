@@ -268,7 +268,7 @@ int command_bands(int argc, char **argv)
          "      sur_vrhel, sur_krinov and sur_koivisto .mat (default: Debian's\n"
          "      psychtoolbox-3-common). To BANDS.ini: one set (default 6 bands) for --bands\n"
          "      and [quality] bands. To BANDS.c and BASIS.c: all counts, as they stand in\n"
-         "      colorimetry/tables/bands.c and reflectance_basis.c (minutes; the same numbers\n"
+         "      colorimetry/tables/bands.c and reflectance_basis.c (a minute; the same numbers\n"
          "      every time)."},
         {"check", command_bands_check, "CHART.csv [COUNT|BANDS.ini]...",
          "Prints how far band coefficients are from full spectra, lamp by lamp."},

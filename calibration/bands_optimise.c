@@ -214,11 +214,11 @@ static bool shape_residuals(void *context, int group, const double *x, double *r
     band_rows(s->training, &set, rows);
     for (int n = 0; n < LAMP_COUNT; n++) {
         struct band_matrix m;
-        double *own = residuals + (size_t)n * 3 * TRAINING_ROWS;
+        double *own = residuals + (size_t)n * BAND_RESIDUALS;
         if (!band_matrix_solve(&s->aims[n], rows, s->count, &m, NULL))
             return false;
         band_residuals(&s->aims[n], rows, &m, own);
-        for (int i = 0; i < 3 * TRAINING_ROWS; i++)
+        for (int i = 0; i < BAND_RESIDUALS; i++)
             own[i] *= LAMPS[n].weight;
     }
     return true;
@@ -240,7 +240,7 @@ static bool search_best(struct search *s, double *best, double *cost, struct err
     const struct least_squares problem = {
         .parameters = 2 * s->count,
         .groups = 1,
-        .group_size = LAMP_COUNT * 3 * TRAINING_ROWS,
+        .group_size = LAMP_COUNT * BAND_RESIDUALS,
         .evaluate = shape_residuals,
         .context = s,
         .numeric = true,

@@ -14,6 +14,10 @@ enum { UNKNOWNS_MOST = 3 * BANDS_MOST };
 // leaves open, far below what it says.
 static const double RIDGE = 1e-7;
 
+// Standard deviation of a coefficient: half floats near 1 round by 1.4e-4, a
+// camera or an instrument does worse.
+static const double COEFFICIENT_NOISE = 5e-4;
+
 struct normal {
     int n;
     double a[UNKNOWNS_MOST][UNKNOWNS_MOST], b[UNKNOWNS_MOST];
@@ -28,6 +32,34 @@ void band_training_shipped(struct band_training *out)
         spectrum_from_samples(nm, REFLECTANCE_BASIS[v], BASIS_SAMPLES, true, &out->basis[v], NULL);
     memcpy(out->coefficients, REFLECTANCE_ROWS, sizeof out->coefficients);
     memcpy(out->weights, REFLECTANCE_WEIGHTS, sizeof out->weights);
+}
+
+// Upper triangular U with U'U = g.
+static struct mat3 root(struct mat3 g)
+{
+    struct mat3 u = {{{0}}};
+    for (int i = 0; i < 3; i++)
+        for (int j = i; j < 3; j++) {
+            double rest = g.m[i][j];
+            for (int k = 0; k < i; k++)
+                rest -= u.m[k][i] * u.m[k][j];
+            u.m[i][j] = i == j ? sqrt(fmax(rest, 0)) : u.m[i][i] > 0 ? rest / u.m[i][i] : 0;
+        }
+    return u;
+}
+
+static struct mat3 noise_of(const struct band_aim *aim)
+{
+    struct mat3 g = {{{0}}};
+    for (int i = 0; i < TRAINING_ROWS; i++) {
+        struct mat3 own = mat3_mul(mat3_transpose(aim->slopes[i]), aim->slopes[i]);
+        for (int k = 0; k < 9; k++)
+            g.m[k / 3][k % 3] += own.m[k / 3][k % 3];
+    }
+    g = root(g);
+    for (int k = 0; k < 9; k++)
+        g.m[k / 3][k % 3] *= COEFFICIENT_NOISE;
+    return g;
 }
 
 bool band_aim_at(const struct band_training *training, const struct spectrum *lamp,
@@ -55,6 +87,7 @@ bool band_aim_at(const struct band_training *training, const struct spectrum *la
         for (int k = 0; k < 9; k++)
             out->slopes[i].m[k / 3][k % 3] *= training->weights[i];
     }
+    out->noise = noise_of(out);
     return true;
 }
 
@@ -125,6 +158,20 @@ static bool solve(struct normal *eq, struct error *err)
     return true;
 }
 
+static void add_noise(struct normal *eq, const struct band_aim *aim, int k)
+{
+    struct xyz white = aim->white;
+    double c[BANDS_MOST];
+    for (int noisy = 0; noisy < k; noisy++) {
+        for (int j = 0; j < k; j++)
+            c[j] = j == noisy;
+        add_row(eq, &aim->noise, c, k, (struct xyz){0, 0, 0});
+    }
+    for (int j = 0; j < k; j++)
+        c[j] = -1; // the last column is white less the others
+    add_row(eq, &aim->noise, c, k, (struct xyz){-white.X, -white.Y, -white.Z});
+}
+
 bool band_matrix_solve(const struct band_aim *aim, const struct bands *rows, int count,
                        struct band_matrix *out, struct error *err)
 {
@@ -140,6 +187,7 @@ bool band_matrix_solve(const struct band_aim *aim, const struct bands *rows, int
                 (struct xyz){t.X - last * aim->white.X, t.Y - last * aim->white.Y,
                              t.Z - last * aim->white.Z});
     }
+    add_noise(&eq, aim, k);
     if (!solve(&eq, err))
         return false;
     const double white[3] = {aim->white.X, aim->white.Y, aim->white.Z};
@@ -154,17 +202,25 @@ bool band_matrix_solve(const struct band_aim *aim, const struct bands *rows, int
     return true;
 }
 
-void band_residuals(const struct band_aim *aim, const struct bands *rows,
-                    const struct band_matrix *matrix, double residuals[3 * TRAINING_ROWS])
+static void put(double *residuals, int at, struct mat3 slopes, struct xyz off)
 {
+    struct xyz r = xyz_apply(slopes, off);
+    residuals[3 * at] = r.X;
+    residuals[3 * at + 1] = r.Y;
+    residuals[3 * at + 2] = r.Z;
+}
+
+void band_residuals(const struct band_aim *aim, const struct bands *rows,
+                    const struct band_matrix *matrix, double residuals[BAND_RESIDUALS])
+{
+    const double(*m)[BANDS_MOST] = matrix->m;
     for (int i = 0; i < TRAINING_ROWS; i++) {
         struct xyz c = band_xyz(matrix, &rows[i]);
         struct xyz off = {c.X - aim->xyz[i].X, c.Y - aim->xyz[i].Y, c.Z - aim->xyz[i].Z};
-        struct xyz r = xyz_apply(aim->slopes[i], off);
-        residuals[3 * i] = r.X;
-        residuals[3 * i + 1] = r.Y;
-        residuals[3 * i + 2] = r.Z;
+        put(residuals, i, aim->slopes[i], off);
     }
+    for (int j = 0; j < BANDS_MOST; j++)
+        put(residuals, TRAINING_ROWS + j, aim->noise, (struct xyz){m[0][j], m[1][j], m[2][j]});
 }
 
 bool band_matrix_adapted(const struct band_set *set, const struct spectrum *lamp,

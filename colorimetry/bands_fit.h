@@ -13,6 +13,7 @@ enum {
     BASIS_FIRST_NM = 390,
     BASIS_STEP_NM = 5,
     TRAINING_ROWS = 128,
+    BAND_RESIDUALS = 3 * (TRAINING_ROWS + BANDS_MOST),
 };
 
 // reflectance of row i = sum over v of coefficients[i][v] * basis[v].
@@ -31,6 +32,7 @@ struct band_aim {
     struct xyz white;
     struct xyz xyz[TRAINING_ROWS];
     struct mat3 slopes[TRAINING_ROWS]; // |slopes dXYZ| = weighted dE00
+    struct mat3 noise; // |noise m_j|: weighted dE00 over all rows from noise in coefficient j
 };
 
 // Error DATA for a lamp that is dark to this observer.
@@ -41,12 +43,14 @@ bool band_aim_at(const struct band_training *training, const struct spectrum *la
 void band_rows(const struct band_training *training, const struct band_set *set,
                struct bands rows[TRAINING_ROWS]);
 
-// Least squares over the rows with the perfect diffuser exact.
+// Least squares over the rows with the perfect diffuser exact. Coefficients
+// are taken to carry noise (half floats, cameras), so that bands lying close
+// together do not end up as differences of large numbers.
 bool band_matrix_solve(const struct band_aim *aim, const struct bands *rows, int count,
                        struct band_matrix *out, struct error *err);
 
-// Weighted residuals of a matrix: three per row.
+// Weighted residuals of a matrix: three per row, three per coefficient's noise.
 void band_residuals(const struct band_aim *aim, const struct bands *rows,
-                    const struct band_matrix *matrix, double residuals[3 * TRAINING_ROWS]);
+                    const struct band_matrix *matrix, double residuals[BAND_RESIDUALS]);
 
 #endif
