@@ -22,7 +22,6 @@ enum {
     FPGA_ECHO_FLAME = 0xfe,
     SPEED_FULL = 0x00,
     SPEED_HIGH = 0x80,
-    LONGEST_US = 1000000, // of exposures the driver chooses itself
     READOUT_US = 2000,
     MARGIN_US = 20000,
     STALE_READINGS = 2, // acquisitions a unit makes on its own, ocean.md
@@ -200,7 +199,7 @@ static struct spectrometer *ocean_open(const struct spectrometer_options *option
         return NULL;
     }
     s->options = *options;
-    int first_us = ocean_round_exposure(options->integration_us, options->mains_hz, LONGEST_US);
+    int first_us = ocean_round_exposure(options->integration_us, options->mains_hz, options->longest_us);
     if (find_unit(s, deadline_ns, err) && load_calibration(s, err) &&
         read_firmware(s, deadline_ns, err) && set_trigger_normal(s, deadline_ns, err) &&
         set_integration(s, first_us, deadline_ns, err))
@@ -336,7 +335,8 @@ static bool ocean_read(struct spectrometer *s, int64_t deadline_ns, struct spect
     struct error own;
     err = err ? err : &own;
     int64_t fair_us = (deadline_ns - clock_now_ns()) / NS_PER_US / (2 + STALE_READINGS);
-    int longest = ocean_round_exposure((double)fair_us - MARGIN_US, s->options.mains_hz, LONGEST_US);
+    int longest = ocean_round_exposure((double)fair_us - MARGIN_US, s->options.mains_hz,
+                                       s->options.longest_us);
     if (s->integration_us > longest && !fits(s, s->stale + 1, deadline_ns) &&
         !set_integration(s, longest, deadline_ns, err))
         return lost(s, err);

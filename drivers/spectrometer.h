@@ -42,6 +42,7 @@ struct spectrometer_options {
     double collector_mm2;  // area of the cosine corrector, 0.01..10000
     double mains_hz;       // 50 or 60: exposures are multiples of half its period
     int integration_us;    // first exposure, 1000..65535000
+    int longest_us;        // longest exposure it chooses itself, 1000..65535000
     int average;           // readings per sample, 1..100
 };
 
