@@ -15,8 +15,8 @@ static const char HEAD[] =
     "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>boothd accuracy report</title>\n"
     "<style>body{font:14px/1.45 system-ui,sans-serif;max-width:60em;margin:2em auto;padding:0 1em;color:#1c1917}"
     "h1{font-size:1.7em}h2{margin-top:2em;border-bottom:1px solid #d6d3d1}"
-    "table{border-collapse:collapse;margin:.6em 0}td,th{padding:.15em .7em;text-align:right}"
-    "td:first-child,th:first-child{text-align:left}thead th{border-bottom:1px solid #78716c}"
+    "table{border-collapse:collapse;margin:.6em 0}td,th{padding:.15em .6em;text-align:right}"
+    "td:first-child,th:first-child{text-align:left;white-space:nowrap}thead td{text-align:center}thead th{border-bottom:1px solid #78716c}"
     "tr.published td{color:#78716c;font-style:italic}.bad{color:#b91c1c}"
     ".note{background:#fef3c7;padding:.6em 1em;border-left:4px solid #d97706}"
     "svg.plot{width:100%;font-size:11px}svg .grid{stroke:#e7e5e4}"
@@ -91,9 +91,10 @@ static void lamp_bars(FILE *out, const struct lamp_report *l)
 
 static void lamp_patches(FILE *out, const struct lamp_report *l)
 {
-    fprintf(out, "<table><thead><tr><th>patch</th><th>X</th><th>Y</th><th>Z reference</th><th>X</th><th>Y</th>"
-                 "<th>Z measured</th><th>simulation</th><th>published</th><th>absolute</th><th>gamut</th>"
-                 "<th>reading</th></tr></thead>\n");
+    fprintf(out, "<table><thead><tr><td></td><td colspan=\"3\">reference, cd/m²</td><td colspan=\"3\">measured, "
+                 "cd/m²</td><td colspan=\"3\">&Delta;E00</td></tr><tr><th>patch</th><th>X</th><th>Y</th><th>Z</th>"
+                 "<th>X</th><th>Y</th><th>Z</th><th>simulation</th><th>published</th><th>absolute</th>"
+                 "<th>gamut</th><th>reading</th></tr></thead>\n");
     for (int i = 0; i < l->patch_count; i++) {
         const struct patch_report *p = &l->patches[i];
         fprintf(out, "<tr><td>");
