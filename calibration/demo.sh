@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # The main job on emulated instruments: boothsim brings up the booth, boothd
 # runs against it, boothcal works through a session.
-#   demo.sh FOLDER       results go to FOLDER; programs come from $BUILD (build)
+#   demo.sh FOLDER [OPTION...]   results go to FOLDER, options to boothcal session;
+#                                programs come from $BUILD (build)
 # LAMP_A, LAMP_D50, LAMP_D65 replace a lamp's spectrum: a CIE name or a file.
 set -eu
 
@@ -20,6 +21,7 @@ spectrum_of() {
 
 if [ "$1" = --inside ]; then
     out=$2
+    shift 2
     run=$out/run
     daemon=
     trap '[ -z "$daemon" ] || kill "$daemon" 2>/dev/null || :' EXIT
@@ -35,7 +37,6 @@ if [ "$1" = --inside ]; then
         fi
         sleep 0.2
     done
-    set --
     for lamp in $lamps; do set -- "$@" --lamp "$lamp=$(spectrum_of $lamp)"; done
     "$programs/boothcal" session --config "$run/boothd.conf" --socket "$run/boothd.sock" \
         --booth "$run/boothsim.sock" --maps "$run" --out "$out" "$@"
@@ -48,6 +49,7 @@ fi
 
 mkdir -p "$1"
 out=$(cd "$1" && pwd)
+shift
 run=$out/run
 rm -rf "$run"
 mkdir -p "$run/lamps"
@@ -60,7 +62,7 @@ folder = $root/config/materials
 [control]
 socket = $run/boothd.sock
 END
-set --
-for lamp in $lamps; do set -- "$@" --lamp "$lamp=$(spectrum_of $lamp)"; done
-exec "$programs/boothsim" --scenario "$root/simulator/scenarios/booth.ini" --run "$run" "$@" -- \
-    "$root/calibration/demo.sh" --inside "$out"
+for lamp in $lamps; do spectra="${spectra:-} --lamp $lamp=$(spectrum_of $lamp)"; done
+# shellcheck disable=SC2086
+exec "$programs/boothsim" --scenario "$root/simulator/scenarios/booth.ini" --run "$run" $spectra -- \
+    "$root/calibration/demo.sh" --inside "$out" "$@"

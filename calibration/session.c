@@ -27,6 +27,7 @@ static const char USAGE[] =
     "  --lamp NAME[=TEXT]   a lamp of the booth, in order; TEXT is noted in the report\n"
     "                       (default: A, D50, D65)\n"
     "  --material NAME      chart to proof (default: colorchecker24)\n"
+    "  --rehearse           few patches: shows that the chain works, proves nothing\n"
     "  -o, --out FOLDER     where report.html, report.json, display.ti3 and pictures go\n"
     "  --help\n";
 
@@ -34,6 +35,7 @@ struct options {
     const char *config, *socket, *booth, *maps, *out, *material;
     const char *lamps[FACTS_LAMPS];
     int lamp_count;
+    bool rehearse;
 };
 
 static int misused(const char *text)
@@ -48,8 +50,8 @@ static int parse(int argc, char **argv, struct options *o)
         {"config", required_argument, NULL, 'c'}, {"socket", required_argument, NULL, 's'},
         {"booth", required_argument, NULL, 'b'},  {"maps", required_argument, NULL, 'm'},
         {"lamp", required_argument, NULL, 'l'},   {"material", required_argument, NULL, 'k'},
-        {"out", required_argument, NULL, 'o'},    {"help", no_argument, NULL, 'h'},
-        {0},
+        {"rehearse", no_argument, NULL, 'r'},     {"out", required_argument, NULL, 'o'},
+        {"help", no_argument, NULL, 'h'},         {0},
     };
     *o = (struct options){.material = "colorchecker24"};
     for (int c; (c = getopt_long(argc, argv, "o:h", LONG, NULL)) != -1;) {
@@ -59,6 +61,7 @@ static int parse(int argc, char **argv, struct options *o)
         case 'b': o->booth = optarg; break;
         case 'm': o->maps = optarg; break;
         case 'k': o->material = optarg; break;
+        case 'r': o->rehearse = true; break;
         case 'o': o->out = optarg; break;
         case 'l':
             if (o->lamp_count == FACTS_LAMPS)
@@ -161,7 +164,8 @@ int command_session(int argc, char **argv)
     struct error err = {0};
     bool fine = false;
     if (facts && s) {
-        *s = (struct session){.facts = facts, .out = o.out, .maps = o.maps, .material = o.material};
+        *s = (struct session){.facts = facts, .out = o.out, .maps = o.maps, .material = o.material,
+                              .rehearse = o.rehearse};
         fine = run(s, &o, &err);
         control_close(s->bench.daemon);
         control_close(s->bench.booth);

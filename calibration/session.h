@@ -15,6 +15,7 @@ struct session {
     const char *out;       // folder of the results
     const char *maps;      // folder of luminance maps "ceiling-<lamp>.exr"
     const char *material;  // chart to proof
+    bool rehearse;         // few patches only: shows that the chain works
 };
 
 // Teaches lamp i from live readings, scales its luminance map by spot readings

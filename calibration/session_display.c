@@ -8,7 +8,13 @@
 #include "calibration/session.h"
 #include "config/display_file.h"
 
-enum { RAMP_STEPS = 16, RANDOM = 60, WHITE_EVERY = 25, VERIFY = 40 };
+enum { VERIFY_MOST = 40 };
+
+// Sizes of the patch sets.
+struct sizes {
+    int ramp_steps, random, white_every, verify;
+};
+static const struct sizes WHOLE = {16, 60, 25, VERIFY_MOST}, REHEARSAL = {6, 10, 25, 8};
 static const uint64_t SEED = 20040912;
 
 static bool measure_set(struct session *s, struct patch_set *set, const char *step, struct error *err)
@@ -59,8 +65,8 @@ static bool check(struct display_report *d, const struct display_model *model, c
     struct measurements apart;
     if (!measurements_load(path, &apart, err))
         return false;
-    double differences[VERIFY];
-    bool fine = apart.count <= VERIFY && display_differences(&apart, model, differences, err);
+    double differences[VERIFY_MOST];
+    bool fine = apart.count <= VERIFY_MOST && display_differences(&apart, model, differences, err);
     if (fine)
         d->verification = summarise(differences, apart.count);
     measurements_fini(&apart);
@@ -99,10 +105,11 @@ bool session_characterise(struct session *s, struct error *err)
     snprintf(d->measurements, sizeof d->measurements, "%s/display.ti3", s->out);
     snprintf(verify_path, sizeof verify_path, "%s/verify.ti3", s->out);
     snprintf(d->model, sizeof d->model, "%s", s->settings.display.model);
+    const struct sizes *z = s->rehearse ? &REHEARSAL : &WHOLE;
     struct patch_set fit = {0}, verify = {0};
     bool fine = bench_lamp(&s->bench, "none", err) && bench_await_lamp(&s->bench, "", 30, err) &&
-                patch_set_characterise(RAMP_STEPS, RANDOM, WHITE_EVERY, SEED, &fit, err) &&
-                patch_set_verify(VERIFY, SEED + 1, &verify, err) &&
+                patch_set_characterise(z->ramp_steps, z->random, z->white_every, SEED, &fit, err) &&
+                patch_set_verify(z->verify, SEED + 1, &verify, err) &&
                 measure(s, &fit, &verify, verify_path, err) &&
                 fit_model(s, verify_path, err) && bench_reload(&s->bench, err);
     patch_set_fini(&fit);

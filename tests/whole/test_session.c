@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+// The main job end to end: emulated booth, daemon, session, report. With few
+// patches, so that it passes quickly under sanitizers too.
+#include <jansson.h>
+#include <math.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+// What the demo must reach with its whole patch sets is 0.6 mean and 1.8 max; a
+// display model from a rehearsal's few patches may be off by half as much more.
+static const double REHEARSED_MEAN = 0.9, REHEARSED_MAX = 2.7;
+static const double BANDS_MEAN = 0.10, BANDS_MAX = 0.30; // six bands, under A, FL8 and FL3.15
+static const double WHITE_PERCENT = 1.5;
+static const double TILT_DEG = 0.1;  // noise of the emulated inclinometer is 0.02
+static const double EYE_M = 0.03;    // half a pixel of blob noise at 0.9 m
+
+static char folder[] = "/tmp/session-XXXXXX";
+static json_t *report;
+
+static int a_rehearsed_session(void **state)
+{
+    (void)state;
+    char line[256], path[64];
+    if (!mkdtemp(folder))
+        return -1;
+    snprintf(line, sizeof line, "calibration/demo.sh %s --rehearse >%s/said 2>&1", folder, folder);
+    if (system(line)) {
+        snprintf(line, sizeof line, "cat %s/said %s/boothd.log", folder, folder);
+        return system(line), -1;
+    }
+    snprintf(path, sizeof path, "%s/report.json", folder);
+    report = json_load_file(path, 0, NULL);
+    return report ? 0 : -1;
+}
+
+static int cleared(void **state)
+{
+    (void)state;
+    char line[64];
+    json_decref(report);
+    snprintf(line, sizeof line, "rm -r %s", folder);
+    return system(line);
+}
+
+static const json_t *lamp(size_t i)
+{
+    return json_array_get(json_object_get(report, "lamps"), i);
+}
+
+static double figure(size_t i, const char *which, const char *what)
+{
+    const json_t *all = json_object_get(lamp(i), "de00");
+    double v = json_number_value(json_object_get(json_object_get(all, which), what));
+    print_message("lamp %s, %s: %s %.3f\n", json_string_value(json_object_get(lamp(i), "name")), which,
+                  what, v);
+    return v;
+}
+
+static void the_screen_shows_the_chart_under_every_lamp(void **state)
+{
+    (void)state;
+    assert_int_equal(json_array_size(json_object_get(report, "lamps")), 3);
+    for (size_t i = 0; i < 3; i++) {
+        assert_int_equal(json_array_size(json_object_get(lamp(i), "patches")), 24);
+        assert_true(figure(i, "published_in_gamut", "n") >= 18);
+        assert_true(figure(i, "published_in_gamut", "mean") <= REHEARSED_MEAN);
+        assert_true(figure(i, "published_in_gamut", "max") <= REHEARSED_MAX);
+        assert_true(figure(i, "published_in_gamut", "mean") > 0);
+    }
+}
+
+static void six_bands_simulate_the_chart(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < 3; i++) {
+        assert_true(figure(i, "simulation", "mean") <= BANDS_MEAN);
+        assert_true(figure(i, "simulation", "max") <= BANDS_MAX);
+    }
+}
+
+static void white_has_its_absolute_luminance_at_every_tilt(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < 3; i++)
+        assert_true(fabs(json_number_value(json_object_get(
+                        lamp(i), "white_luminance_error_percent"))) <= WHITE_PERCENT);
+    size_t i;
+    json_t *pose;
+    json_array_foreach(json_object_get(report, "poses"), i, pose)
+        assert_true(fabs(json_number_value(json_object_get(pose, "white_luminance_error_percent"))) <=
+                    WHITE_PERCENT);
+}
+
+static void tilt_and_eye_are_seen_where_they_are(void **state)
+{
+    (void)state;
+    size_t i;
+    json_t *pose;
+    assert_true(json_array_size(json_object_get(report, "poses")) >= 5);
+    json_array_foreach(json_object_get(report, "poses"), i, pose) {
+        double truth[3], seen[3], tilt = json_number_value(json_object_get(pose, "tilt_deg"));
+        assert_int_equal(json_unpack(pose, "{s[FFF]s[FFF]}", "eye_m", &truth[0], &truth[1], &truth[2],
+                                     "eye_seen_m", &seen[0], &seen[1], &seen[2]),
+                         0);
+        assert_true(fabs(tilt - json_number_value(json_object_get(pose, "tilt_seen_deg"))) <= TILT_DEG);
+        assert_true(hypot(hypot(truth[0] - seen[0], truth[1] - seen[1]), truth[2] - seen[2]) <= EYE_M);
+    }
+}
+
+static void every_reading_is_kept_and_labelled_as_emulated(void **state)
+{
+    (void)state;
+    size_t i;
+    json_t *reading;
+    assert_true(json_is_true(json_object_get(report, "emulated")));
+    assert_true(json_array_size(json_object_get(report, "readings")) > 100);
+    json_array_foreach(json_object_get(report, "readings"), i, reading)
+        assert_true(json_is_true(json_object_get(reading, "emulated")));
+}
+
+static void the_files_of_the_session_are_there(void **state)
+{
+    (void)state;
+    static const char *const FILES[] = {"report.html", "display.ti3",   "verify.ti3",   "display.ini",
+                                        "chart-A.png", "chart-D50.png", "chart-D65.png"};
+    for (size_t i = 0; i < sizeof FILES / sizeof *FILES; i++) {
+        char path[128];
+        snprintf(path, sizeof path, "%s/%s", folder, FILES[i]);
+        assert_int_equal(access(path, R_OK), 0);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_screen_shows_the_chart_under_every_lamp),
+        cmocka_unit_test(six_bands_simulate_the_chart),
+        cmocka_unit_test(white_has_its_absolute_luminance_at_every_tilt),
+        cmocka_unit_test(tilt_and_eye_are_seen_where_they_are),
+        cmocka_unit_test(every_reading_is_kept_and_labelled_as_emulated),
+        cmocka_unit_test(the_files_of_the_session_are_there),
+    };
+    return cmocka_run_group_tests(tests, a_rehearsed_session, cleared);
+}
