@@ -18,6 +18,7 @@ enum {
     MEASURE_MS = 65000, // adaptive exposure gives up after 60 s
     POINTS_MOST = 401,
     UNITS_SI = 0,
+    MOST_FAILURES = 3,
 };
 
 #define ENTER_REMOTE "PHOTO"
@@ -52,6 +53,7 @@ struct radiometer {
     char model[64], serial[64];
     bool remote; // in remote mode
     bool adrift; // an answer may still be under way
+    int failures; // attempts to find it again, one after the other
 };
 
 bool pr655_status(const char *line, int *status, const char **rest)
@@ -180,6 +182,7 @@ static bool enter_remote(struct radiometer *r, int64_t deadline_ns, struct error
 }
 
 // After a lost answer: asks for the model until it is the model that answers.
+// An instrument that was switched off and on is not in remote mode: reopen.
 static bool find_again(struct radiometer *r, int64_t deadline_ns, struct error *err)
 {
     char text[256];
@@ -188,8 +191,11 @@ static bool find_again(struct radiometer *r, int64_t deadline_ns, struct error *
     while (ask_text(r, GET_MODEL, text, sizeof text, deadline_ns, err))
         if (!strcmp(text, r->model)) {
             r->adrift = false;
+            r->failures = 0;
             return true;
         }
+    if (++r->failures >= MOST_FAILURES)
+        err->code = ERROR_GONE;
     return false;
 }
 

@@ -115,6 +115,9 @@ static bool next_line(struct serial_line *line, char *text, size_t size)
         if (line->pending[end] == '\r' || line->pending[end] == '\n')
             break;
     bool whole = end < line->used;
+    for (size_t i = skip; i < end; i++)
+        if (line->pending[i] < ' ' || line->pending[i] > '~')
+            line->pending[i] = '?';
     if (whole)
         snprintf(text, size, "%.*s", (int)(end - skip), line->pending + skip);
     size_t drop = whole ? end : skip;

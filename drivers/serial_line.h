@@ -26,8 +26,9 @@ void serial_line_close(struct serial_line *line);
 bool serial_line_write(struct serial_line *line, const char *text, int gap_ms, int64_t deadline_ns,
                        struct error *err);
 
-// The next line that is not empty, without CR and LF, cut to size. RETRY when
-// none came within wait_ms or by the deadline, GONE.
+// The next line that is not empty, without CR and LF, cut to size; anything but
+// printable ASCII becomes '?'. RETRY when none came within wait_ms or by the
+// deadline, DATA when it has no end, GONE.
 bool serial_line_read(struct serial_line *line, char *text, size_t size, int wait_ms,
                       int64_t deadline_ns, struct error *err);
 

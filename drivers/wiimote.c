@@ -32,6 +32,9 @@ enum {
     PACE_MS = 30,     // between writes of the initialisation
     SILENCE_MS = 250, // after which the mode is asserted again
     TRAVEL_MS = 25,   // from exposure to the report's arrival
+    SET_UP_MS = 400,  // a whole initialisation, with slack
+    BLIND_MS = 1000,  // without a blob, before it is repeated; doubles each time
+    BLIND_MOST_MS = 60000,
     MOST_SILENT = 4,
 };
 
@@ -60,7 +63,10 @@ struct tracker {
     hid_device *hid;
     char model[64], serial[64];
     struct head_memory memory;
-    int silent; // reads without a report, one after the other
+    int silent;         // reads without a report, one after the other
+    bool mode_lost;     // other reports came, or none: the camera may have lost its settings too
+    int64_t blind_ns;   // since when there is no blob
+    int blind_limit_ms; // before the camera is set up again
 };
 
 struct wiimote_blob wiimote_decode(const uint8_t b[3])
@@ -166,6 +172,26 @@ static bool set_up(struct tracker *t, int64_t deadline_ns, struct error *err)
            poke(t, reg_run, &run, 1, deadline_ns, err) && assert_mode(t, err);
 }
 
+// A camera may come up blind, or fall back to that; an observer may also just
+// be away, so the pauses grow.
+static bool cure_blindness(struct tracker *t, int seen, int64_t deadline_ns, struct error *err)
+{
+    int64_t now = clock_now_ns();
+    if (seen > 0) {
+        t->mode_lost = false;
+        t->blind_ns = now;
+        t->blind_limit_ms = BLIND_MS;
+    }
+    if (now - t->blind_ns < t->blind_limit_ms * NS_PER_MS)
+        return true;
+    if (deadline_ms(deadline_ns, SET_UP_MS) < SET_UP_MS)
+        return !t->mode_lost || fail(err, ERROR_GONE, "the Wii remote lost its settings");
+    t->mode_lost = false;
+    t->blind_ns = now;
+    t->blind_limit_ms = t->blind_limit_ms < BLIND_MOST_MS ? 2 * t->blind_limit_ms : BLIND_MOST_MS;
+    return set_up(t, deadline_ns, err);
+}
+
 static void narrow(char *out, size_t size, const wchar_t *wide)
 {
     size_t n = 0;
@@ -190,19 +216,23 @@ static bool open_path(struct tracker *t, const struct hid_device_info *info, str
 
 static bool find(struct tracker *t, struct error *err)
 {
-    fail(err, ERROR_GONE, "no Wii remote%s%s", *t->options.serial ? " with serial number " : "",
-         t->options.serial);
+    struct error why = {0};
     for (const struct device_id *id = wiimote_ids; id->name && !t->hid; id++) {
         struct hid_device_info *list =
             hid_enumerate((unsigned short)id->vendor, (unsigned short)id->product);
         for (struct hid_device_info *info = list; info && !t->hid; info = info->next) {
             narrow(t->serial, sizeof t->serial, info->serial_number);
             if (!*t->options.serial || !strcmp(t->options.serial, t->serial))
-                open_path(t, info, err);
+                open_path(t, info, &why);
         }
         hid_free_enumeration(list);
     }
-    return t->hid != NULL;
+    if (t->hid)
+        return true;
+    if (why.code)
+        return fail(err, why.code, "%s", why.text);
+    return fail(err, ERROR_GONE, "no Wii remote%s%s",
+                *t->options.serial ? " with serial number " : "", t->options.serial);
 }
 
 static void wiimote_close(struct tracker *t)
@@ -223,6 +253,8 @@ static struct tracker *wiimote_open(const struct tracker_options *options, int64
         return NULL;
     }
     t->options = *options;
+    t->blind_ns = clock_now_ns();
+    t->blind_limit_ms = BLIND_MS;
     if (find(t, err) && set_up(t, deadline_ns, err))
         return t;
     wiimote_close(t);
@@ -250,7 +282,10 @@ static bool fresh_blobs(struct tracker *t, int64_t deadline_ns,
             return gone(err);
         if (count > 0 && wiimote_report(r, (size_t)count, blobs, &why))
             return true;
-        if ((count == 0 || r[0] != IN_CORE_ACCEL_CAMERA) && !assert_mode(t, err))
+        if (count > 0 && r[0] == IN_CORE_ACCEL_CAMERA)
+            continue;
+        t->mode_lost = true;
+        if (!assert_mode(t, err))
             return false;
     }
     if (++t->silent >= MOST_SILENT)
@@ -275,7 +310,7 @@ static bool wiimote_read(struct tracker *t, int64_t deadline_ns, struct head_sam
             wiimote_direction(blobs[i], focal, directions[seen++]);
     head_solve(&t->memory, head_markers(t->options.marker),
                (struct vec3){offset[0], offset[1], offset[2]}, directions, seen, focal, now, out);
-    return true;
+    return cure_blindness(t, seen, deadline_ns, err);
 }
 
 static void wiimote_identify(const struct tracker *t, struct instrument_identity *out)

@@ -393,6 +393,32 @@ static void exposure_settles_from_anywhere_without_swinging(void **state)
     }
 }
 
+static const char real_unit[] = "../shared/data/spectrometer/FLMS04133.tsv";
+static const double file_digits = 1e-4; // nm; the vendor's coefficients are rounded
+
+static void a_real_units_pixels_lie_where_its_vendor_says(void **state)
+{
+    (void)state;
+    FILE *in = fopen(real_unit, "r");
+    if (!in) {
+        printf("skipped: %s is not there\n", real_unit);
+        skip();
+    }
+    struct ocean_unit unit = unit_of();
+    struct ocean_axis axis = axis_of(&unit, flat_csv);
+    char name[64];
+    int count;
+    while (fscanf(in, "%63s %d", name, &count) == 2 && strcmp(name, "descriptor.wavelengths") != 0)
+        assert_true(fscanf(in, "%*[^\n]") == 0);
+    assert_int_equal(count, OCEAN_PIXELS);
+    for (int i = 0; i < count; i++) {
+        double nm;
+        assert_int_equal(fscanf(in, "%lf", &nm), 1);
+        assert_near((axis.edge_nm[i] + axis.edge_nm[i + 1]) / 2, nm, file_digits);
+    }
+    fclose(in);
+}
+
 static void a_spectrometer_that_is_not_there_is_gone(void **state)
 {
     (void)state;
@@ -429,6 +455,7 @@ int main(void)
         cmocka_unit_test(exposure_steps_are_bounded),
         cmocka_unit_test(exposures_from_half_a_mains_period_on_are_its_multiples),
         cmocka_unit_test(exposure_settles_from_anywhere_without_swinging),
+        cmocka_unit_test(a_real_units_pixels_lie_where_its_vendor_says),
         cmocka_unit_test(a_spectrometer_that_is_not_there_is_gone),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
