@@ -32,12 +32,12 @@ static inline void folder_close(struct folder *f)
     nftw(f->path, folder_remove, 16, FTW_DEPTH | FTW_PHYS);
 }
 
-// "folder/name" into one of eight turns' buffers.
+// "folder/name"; good until the sixteenth call after.
 static inline const char *folder_at(const struct folder *f, const char *name)
 {
-    static char paths[8][256];
+    static char paths[16][256];
     static int turn;
-    char *path = paths[turn++ % 8];
+    char *path = paths[turn++ % 16];
     snprintf(path, sizeof *paths, "%s/%s", f->path, name);
     return path;
 }
