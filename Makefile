@@ -56,10 +56,10 @@ FAKES    := $(wildcard tests/fakes/*.c)
 SHADERS  := $(wildcard render/shaders/*.glsl colorimetry/*.glsl)
 object    = $(patsubst %,$(BUILD)/%.o,$(basename $(1)))
 
-.PHONY: FORCE all deps demo check check-here bench format layers links install uninstall clean
+.PHONY: FORCE all deps demo check check-here bench format layers links made install install-only uninstall clean
 .SECONDARY:
 
-all: $(PROGRAMS:%=$(BUILD)/%)
+all: $(PROGRAMS:%=$(BUILD)/%) made
 
 deps:
 	tests/deps.sh $(PACKAGES)
@@ -159,27 +159,33 @@ INSTALLED := $(foreach p,$(PROGRAMS),$(BUILD)/$(p)=bin/$(p)=755) \
 
 $(BUILD)/made/boothd.conf: $(BUILD)/boothd
 	@mkdir -p $(@D)
-	$< --describe >$@
+	@$< --describe >$@
 
 $(BUILD)/made/70-boothd.rules: $(BUILD)/boothd
 	@mkdir -p $(@D)
-	$< --udev >$@
+	@$< --udev >$@
 
 $(BUILD)/made/boothd.conf.5: man/boothd.conf.5.in $(BUILD)/boothd
 	@mkdir -p $(@D)
-	$(BUILD)/boothd --describe-man >$@.settings
-	sed -e '/@settings@/{r $@.settings' -e 'd' -e '}' $< >$@
+	@$(BUILD)/boothd --describe-man >$@.settings
+	@sed -e '/@settings@/{r $@.settings' -e 'd' -e '}' $< >$@
 	@rm $@.settings
 
 $(BUILD)/made/boothd.service: systemd/boothd.service $(BUILD)/version
 	@mkdir -p $(@D)
-	sed 's|@bindir@|$(PREFIX)/bin|' $< >$@
+	@sed 's|@bindir@|$(PREFIX)/bin|' $< >$@
 
-install: all $(MADE)
+made: $(MADE)
+
+install: all
+	@$(MAKE) -s --no-print-directory install-only
+	@echo "installed in $(DESTDIR)$(PREFIX); then, as root: systemd-sysusers, systemd-tmpfiles --create, udevadm control --reload"
+
+# Copies what is built already.
+install-only:
 	@for i in $(INSTALLED); do \
 	    from=$${i%%=*}; mode=$${i##*=}; to=$${i#*=}; to=$${to%=*}; \
 	    install -D -m $$mode "$$from" "$(DESTDIR)$(PREFIX)/$$to" || exit 1; done
-	@echo "installed in $(DESTDIR)$(PREFIX); then, as root: systemd-sysusers, systemd-tmpfiles --create, udevadm control --reload"
 
 uninstall:
 	@for i in $(INSTALLED); do to=$${i#*=}; rm -f "$(DESTDIR)$(PREFIX)/$${to%=*}"; done

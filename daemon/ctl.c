@@ -179,10 +179,13 @@ static bool make_request(const struct words *w, struct ctl *c, struct error *err
         return fail(err, ERROR_CONFIG, "--patch belongs to show");
     if (w->readings && strcmp(command->name, CONTROL_TEACH))
         return fail(err, ERROR_CONFIG, "--readings belongs to teach");
+    struct error why = {0};
     c->what = command->name;
-    *err = (struct error){0};
-    c->request = command->request(w, err);
-    return c->request || err->code || fail(err, ERROR_RANGE, "%s: not valid UTF-8", command->name);
+    c->request = command->request(w, &why);
+    if (c->request)
+        return true;
+    return why.code ? fail(err, why.code, "%s", why.text)
+                    : fail(err, ERROR_RANGE, "%s: not valid UTF-8", command->name);
 }
 
 bool ctl_parse(int argc, char **argv, struct ctl *c, struct error *err)
@@ -200,7 +203,7 @@ bool ctl_parse(int argc, char **argv, struct ctl *c, struct error *err)
             return fail(err, ERROR_CONFIG, "too many arguments; see boothctl --help");
         words.of[words.count++] = argv[optind];
     }
-    return c->help || c->version || (make_request(&words, c, err) && c->request);
+    return c->help || c->version || make_request(&words, c, err);
 }
 
 int ctl_timeout_ms(const struct ctl *c)
