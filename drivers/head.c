@@ -5,22 +5,22 @@
 #include <math.h>
 
 static const struct vec3 models[][POSE_POINTS] = {
-    {{0, 0.040, -0.030}, {0, 0, 0}, {0, -0.070, -0.080}},               // clip: top, middle, bottom
-    {{0, 0, 0}, {-0.040, -0.060, -0.100}, {0.040, -0.060, -0.100}},     // cap: top, left, right
+    {{0, 0.040, -0.030}, {0, 0, 0}, {0, -0.070, -0.080}},           // clip: top, middle, bottom
+    {{0, 0, 0}, {-0.040, -0.060, -0.100}, {0.040, -0.060, -0.100}}, // cap: top, left, right
 };
 
 static const double nearest_m = 0.15, farthest_m = 3;
 static const double most_residual_px = 4;
-static const double most_turn = 75 * M_PI / 180;   // from facing the camera, any axis
-static const double most_roll = 50 * M_PI / 180;   // within the image
-static const double most_unlike = 0.15;            // of the blobs' shape, 0..1
-static const double nearly_alike = 0.04;           // orders worth a second look
-static const double turn_step = 20 * M_PI / 180;   // between the heads tried at first
-static const double handicap_per_step = 0.005;     // so that a strange turn needs a reason
-static const double pull_per_m = 5;                // rad of rotation a metre is worth
-static const double alike = 0.1;                   // rad
+static const double most_turn = 75 * M_PI / 180; // from facing the camera, any axis
+static const double most_roll = 50 * M_PI / 180; // within the image
+static const double most_unlike = 0.15;          // of the blobs' shape, 0..1
+static const double nearly_alike = 0.04;         // orders worth a second look
+static const double turn_step = 20 * M_PI / 180; // between the heads tried at first
+static const double handicap_per_step = 0.005;   // so that a strange turn needs a reason
+static const double pull_per_m = 5;              // rad of rotation a metre is worth
+static const double alike = 0.1;                 // rad
 static const double same_eye_m = 0.015;
-static const double jump_m = 0.10, speed_m_s = 3;  // faster is no head
+static const double jump_m = 0.10, speed_m_s = 3; // faster is no head
 static const int64_t memory_ns = NS_PER_S;
 enum { JUMPS_BELIEVED = 3, MATCHES = 24, CANDIDATES = POSE_MOST + 1, CHOICES = 64 };
 
@@ -129,8 +129,9 @@ static double assign(const struct head_memory *memory, const struct vec3 *marker
     for (int yaw = -2; yaw <= 2 && !memory->known; yaw++)
         for (int pitch = -2; pitch <= 1; pitch++) {
             struct rigid turned = front;
-            turned.rotation = mat3_mul(front.rotation, mat3_mul(mat3_rotation(1, yaw * turn_step),
-                                                                mat3_rotation(0, pitch * turn_step)));
+            turned.rotation =
+                mat3_mul(front.rotation, mat3_mul(mat3_rotation(1, yaw * turn_step),
+                                                  mat3_rotation(0, pitch * turn_step)));
             try_pose(&turned, handicap_per_step * (yaw * yaw + pitch * pitch), markers, m);
         }
     for (int i = 0; i < m->count; i++)
@@ -186,7 +187,7 @@ static double cost_of(const struct head_memory *memory, const struct rigid *pose
 static int choose(const struct head_memory *memory, const struct vec3 *markers,
                   const struct match *match, double focal_px, struct choice *choices, int kept)
 {
-    const double (*image)[2] = match->image;
+    const double(*image)[2] = match->image;
     struct rigid found[CANDIDATES], front = facing(image);
     int count = pose_candidates(markers, image, found);
     found[count++] = match->guess;

@@ -38,11 +38,11 @@ struct spectrometer {
     char firmware[16];
     bool flame;
     int integration_us;
-    int slowest_us;       // of the exposures that may still be under way
-    int stale;            // spectra to throw away before the next one counts
-    bool adrift;          // bytes were lost: drain before the next request
-    int failures;         // readings without a spectrum, one after the other
-    int64_t active_ns;    // when the last spectrum came
+    int slowest_us;    // of the exposures that may still be under way
+    int stale;         // spectra to throw away before the next one counts
+    bool adrift;       // bytes were lost: drain before the next request
+    int failures;      // readings without a spectrum, one after the other
+    int64_t active_ns; // when the last spectrum came
 };
 
 static bool query(struct spectrometer *s, const uint8_t *command, size_t count, uint8_t *reply,
@@ -199,7 +199,8 @@ static struct spectrometer *ocean_open(const struct spectrometer_options *option
         return NULL;
     }
     s->options = *options;
-    int first_us = ocean_round_exposure(options->integration_us, options->mains_hz, options->longest_us);
+    int first_us =
+        ocean_round_exposure(options->integration_us, options->mains_hz, options->longest_us);
     if (find_unit(s, deadline_ns, err) && load_calibration(s, err) &&
         read_firmware(s, deadline_ns, err) && set_trigger_normal(s, deadline_ns, err) &&
         set_integration(s, first_us, deadline_ns, err))
@@ -326,7 +327,7 @@ static enum spectrometer_status judge(const struct spectrometer *s,
     if (settling)
         return SPECTROMETER_SETTLING;
     return ocean_signal(&s->unit, &s->axis, reading) < weak_counts ? SPECTROMETER_WEAK
-                                                                    : SPECTROMETER_GOOD;
+                                                                   : SPECTROMETER_GOOD;
 }
 
 static bool ocean_read(struct spectrometer *s, int64_t deadline_ns, struct spectrum_sample *out,

@@ -107,9 +107,9 @@ bool ocean_unit_parse(const uint8_t replies[OCEAN_SLOTS][OCEAN_SLOT_BYTES], stru
             return fail(err, ERROR_DATA, "%s: information slot %d holds no wavelength coefficient",
                         unit.serial, SLOT_WAVELENGTH + i);
     if (!wavelengths_valid(unit.wavelength))
-        return fail(err, ERROR_DATA, "%s: wavelengths do not ascend through the visible: %g %g %g %g",
-                    unit.serial, unit.wavelength[0], unit.wavelength[1], unit.wavelength[2],
-                    unit.wavelength[3]);
+        return fail(err, ERROR_DATA,
+                    "%s: wavelengths do not ascend through the visible: %g %g %g %g", unit.serial,
+                    unit.wavelength[0], unit.wavelength[1], unit.wavelength[2], unit.wavelength[3]);
     parse_nonlinearity(replies, &unit);
     const uint8_t *level = replies[SLOT_SATURATION] + SATURATION_OFFSET;
     unit.saturation = level[0] | level[1] << 8;

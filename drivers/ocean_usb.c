@@ -127,7 +127,8 @@ static bool open_on_bus(struct ocean_usb *usb, int index, struct error *err)
     libusb_device *device = find(usb->context, index, &bare);
     if (!device)
         return fail(err, ERROR_GONE, "no spectrometer on the USB bus%s",
-                    bare ? "; a bare FX2 (04b4:8613) is: its firmware did not load, replug it" : "");
+                    bare ? "; a bare FX2 (04b4:8613) is: its firmware did not load, replug it"
+                         : "");
     bool fits = check_descriptors(device, err);
     code = fits ? libusb_open(device, &usb->handle) : 0;
     libusb_unref_device(device);

@@ -5,7 +5,8 @@
 #include <opencv2/calib3d.hpp>
 #include <vector>
 
-namespace {
+namespace
+{
 
 std::vector<cv::Point3d> points_of(const struct vec3 *model)
 {
@@ -74,10 +75,9 @@ try {
     translation.at<double>(1) = pose->translation.y;
     translation.at<double>(2) = pose->translation.z;
     cv::Rodrigues(matrix, rotation);
-    cv::solvePnPRefineLM(points_of(model), pixels_of(image), cv::Matx33d::eye(), cv::noArray(),
-                         rotation, translation,
-                         cv::TermCriteria(cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 40,
-                                          1e-12));
+    cv::solvePnPRefineLM(
+        points_of(model), pixels_of(image), cv::Matx33d::eye(), cv::noArray(), rotation,
+        translation, cv::TermCriteria(cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 40, 1e-12));
     struct rigid refined = rigid_of(rotation, translation);
     if (!finite(refined))
         return false;

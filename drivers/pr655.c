@@ -51,8 +51,8 @@ struct radiometer {
     struct radiometer_options options;
     struct serial_line line;
     char model[64], serial[64];
-    bool remote; // in remote mode
-    bool adrift; // an answer may still be under way
+    bool remote;  // in remote mode
+    bool adrift;  // an answer may still be under way
     int failures; // attempts to find it again, one after the other
 };
 
@@ -75,7 +75,10 @@ bool pr655_check(int status, struct error *err)
     for (size_t i = 0; i < sizeof meanings / sizeof *meanings; i++)
         if (meanings[i].status == status)
             text = meanings[i].text;
-    return fail(err, status == -2 ? ERROR_RANGE : status <= -1000 ? ERROR_DATA : ERROR_RETRY,
+    return fail(err,
+                status == -2      ? ERROR_RANGE
+                : status <= -1000 ? ERROR_DATA
+                                  : ERROR_RETRY,
                 "radiometer status %d: %s", status, text);
 }
 
@@ -203,8 +206,7 @@ static bool open_line(struct radiometer *r, int64_t deadline_ns, struct error *e
 {
     if (!*r->options.port)
         return fail(err, ERROR_CONFIG, "port: no serial line is given for the radiometer");
-    return serial_line_open(&r->line, r->options.port, err) &&
-           enter_remote(r, deadline_ns, err) &&
+    return serial_line_open(&r->line, r->options.port, err) && enter_remote(r, deadline_ns, err) &&
            ask_text(r, GET_SERIAL, r->serial, sizeof r->serial, deadline_ns, err) &&
            ask_text(r, GET_MODEL, r->model, sizeof r->model, deadline_ns, err);
 }
@@ -265,8 +267,8 @@ static bool read_points(struct radiometer *r, struct points *p, int64_t deadline
     return pr655_spectrum_check(p->nm, p->count, true, err);
 }
 
-static bool measure(struct radiometer *r, struct points *p, struct xyz *xyz,
-                    struct interval *taken, int64_t deadline_ns, struct error *err)
+static bool measure(struct radiometer *r, struct points *p, struct xyz *xyz, struct interval *taken,
+                    int64_t deadline_ns, struct error *err)
 {
     char text[256];
     if (!command(r, MEASURE_SPECTRUM, deadline_ns, err))
@@ -283,7 +285,9 @@ static bool add(struct radiance_sample *sum, const struct points *p, struct xyz 
                 struct interval taken, bool first, struct error *err)
 {
     if (first) {
-        *sum = (struct radiance_sample){.taken = taken, .first_nm = p->nm[0], .count = p->count,
+        *sum = (struct radiance_sample){.taken = taken,
+                                        .first_nm = p->nm[0],
+                                        .count = p->count,
                                         .step_nm = p->nm[1] - p->nm[0]};
     } else if (p->count != sum->count) {
         return fail(err, ERROR_DATA, "%d points after %d", p->count, sum->count);

@@ -140,8 +140,8 @@ static bool pace(struct tracker *t, int64_t deadline_ns, bool *refused, struct e
 static bool poke(struct tracker *t, uint32_t address, const uint8_t *bytes, size_t count,
                  int64_t deadline_ns, struct error *err)
 {
-    uint8_t report[6 + WRITE_MOST] = {OUT_WRITE, SPACE_REGISTERS, address >> 16 & 255,
-                                      address >> 8 & 255, address & 255, (uint8_t)count};
+    uint8_t report[6 + WRITE_MOST] = {OUT_WRITE,          SPACE_REGISTERS, address >> 16 & 255,
+                                      address >> 8 & 255, address & 255,   (uint8_t)count};
     bool refused = true;
     memcpy(report + 6, bytes, count);
     for (int tries = 0; refused; tries++) {

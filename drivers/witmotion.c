@@ -62,8 +62,8 @@ static double wrap(double deg)
     return deg - 360 * rint(deg / 360);
 }
 
-void witmotion_decode(const struct witmotion_map *map, const uint16_t *registers,
-                      double offset_deg, struct tilt_sample *out)
+void witmotion_decode(const struct witmotion_map *map, const uint16_t *registers, double offset_deg,
+                      struct tilt_sample *out)
 {
     const uint16_t *r = registers + (map->accel - map->first);
     const double step = map->g_per_step * standard_gravity;
@@ -102,8 +102,7 @@ static bool check_reply(const struct accelerometer *a, const uint8_t *reply, int
         return fail(err, ERROR_RETRY, "%s: unit %d answered for unit %d", port, reply[0],
                     a->options.unit);
     if (reply[1] == (a->map->function | EXCEPTION))
-        return fail(err, ERROR_RETRY, "%s: %s", port,
-                    modbus_strerror(MODBUS_ENOBASE + reply[2]));
+        return fail(err, ERROR_RETRY, "%s: %s", port, modbus_strerror(MODBUS_ENOBASE + reply[2]));
     if (reply[1] != a->map->function || reply[2] != 2 * words || count < 3 + 2 * words)
         return fail(err, ERROR_RETRY, "%s: function %d with %d bytes instead of %d with %d", port,
                     reply[1], reply[2], a->map->function, 2 * words);
@@ -126,9 +125,12 @@ static bool read_registers(struct accelerometer *a, int first, int words, uint16
                            int64_t deadline_ns, struct error *err)
 {
     uint8_t reply[MODBUS_MAX_ADU_LENGTH];
-    const uint8_t request[] = {(uint8_t)a->options.unit, (uint8_t)a->map->function,
-                               first >> 8 & 255,         first & 255,
-                               0,                        (uint8_t)words};
+    const uint8_t request[] = {(uint8_t)a->options.unit,
+                               (uint8_t)a->map->function,
+                               first >> 8 & 255,
+                               first & 255,
+                               0,
+                               (uint8_t)words};
     if (!set_timeouts(a, deadline_ns, err))
         return false;
     modbus_flush(a->modbus);
@@ -164,7 +166,8 @@ static modbus_t *new_tcp(const char *port, struct error *err)
     int number = atoi(colon + 1);
     if (inet_pton(AF_INET, host, &address) == 1 && number > 0 && number < 65536)
         return modbus_new_tcp(host, number);
-    fail(err, ERROR_CONFIG, "port: \"%s\" is neither a serial line nor a numeric ADDRESS:PORT", port);
+    fail(err, ERROR_CONFIG, "port: \"%s\" is neither a serial line nor a numeric ADDRESS:PORT",
+         port);
     return NULL;
 }
 

@@ -19,8 +19,8 @@ struct witmotion_map {
     int first, count;  // one request reads all of these, count <= WITMOTION_MOST
     int accel;         // x, y, z follow each other, s16
     double g_per_step;
-    int angle;         // roll, pitch, yaw follow each other
-    int words;         // registers of one angle: 1 (s16) or 2 (s32, low word first)
+    int angle; // roll, pitch, yaw follow each other
+    int words; // registers of one angle: 1 (s16) or 2 (s32, low word first)
     double deg_per_step;
     int version, serial; // firmware; six registers of two characters
 };
@@ -31,7 +31,7 @@ const struct witmotion_map *witmotion_map(int model);
 double witmotion_angle(const struct witmotion_map *map, const uint16_t *registers, int which);
 
 // Everything of a sample but its time.
-void witmotion_decode(const struct witmotion_map *map, const uint16_t *registers,
-                      double offset_deg, struct tilt_sample *out);
+void witmotion_decode(const struct witmotion_map *map, const uint16_t *registers, double offset_deg,
+                      struct tilt_sample *out);
 
 #endif

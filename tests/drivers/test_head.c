@@ -14,10 +14,10 @@
 
 enum { CLIP, CAP };
 
-static const double exact_m = 1e-5;     // P3P and refinement in double, no quantisation
-static const double quantised_m = 3e-3; // half-pixel grid at 0.5..1 m: the aim of the driver
+static const double exact_m = 1e-5;       // P3P and refinement in double, no quantisation
+static const double quantised_m = 3e-3;   // half-pixel grid at 0.5..1 m: the aim of the driver
 static const double whole_pixel_m = 6e-3; // the sensor's own grid, up to 0.8 m
-static const double most_residual_px = 1;  // of a solved pose on the quantised image
+static const double most_residual_px = 1; // of a solved pose on the quantised image
 static const struct vec3 eye_offset = {0.07, 0.02, 0.03};
 // Looking further up, the markers fall into one line for the camera.
 static const double most_pitch_deg[] = {20, 0};
@@ -25,9 +25,9 @@ static const double most_pitch_deg[] = {20, 0};
 static struct rigid head_at(struct vec3 place, double yaw_deg, double pitch_deg, double roll_deg)
 {
     const double rad = M_PI / 180;
-    struct mat3 turn = mat3_mul(mat3_rotation(1, yaw_deg * rad),
-                                mat3_mul(mat3_rotation(0, pitch_deg * rad),
-                                         mat3_rotation(2, roll_deg * rad)));
+    struct mat3 turn =
+        mat3_mul(mat3_rotation(1, yaw_deg * rad),
+                 mat3_mul(mat3_rotation(0, pitch_deg * rad), mat3_rotation(2, roll_deg * rad)));
     return (struct rigid){turn, place};
 }
 
@@ -77,7 +77,8 @@ static void a_clip_is_placed_exactly_from_exact_blobs(void **state)
         }
 }
 
-static void a_head_turned_exactly_to_the_camera_is_placed_though_its_blobs_are_collinear(void **state)
+static void
+a_head_turned_exactly_to_the_camera_is_placed_though_its_blobs_are_collinear(void **state)
 {
     (void)state;
     for (double z = 0.5; z <= 1; z += 0.1) {
@@ -106,7 +107,8 @@ static void quantisation_error(int marker, double parts, double farthest, double
                 struct head_memory memory = {0};
                 double blobs[3][2];
                 see(&head, marker, parts, blobs);
-                struct head_sample s = solve(&memory, marker, (const double(*)[2])blobs, 3, NS_PER_S);
+                struct head_sample s =
+                    solve(&memory, marker, (const double(*)[2])blobs, 3, NS_PER_S);
                 assert_int_equal(s.status, TRACKER_SEEN);
                 assert_true(s.reprojection_px < most_residual_px);
                 double e = error_of(&head, &s);
@@ -195,8 +197,9 @@ static void a_jump_is_ambiguous_until_it_persists(void **state)
     int64_t now = NS_PER_S;
     assert_int_equal(solve(&memory, CLIP, (const double(*)[2])a, 3, now).status, TRACKER_SEEN);
     for (int i = 0; i < 3; i++)
-        assert_int_equal(solve(&memory, CLIP, (const double(*)[2])b, 3, now += 10 * NS_PER_MS).status,
-                         TRACKER_AMBIGUOUS);
+        assert_int_equal(
+            solve(&memory, CLIP, (const double(*)[2])b, 3, now += 10 * NS_PER_MS).status,
+            TRACKER_AMBIGUOUS);
     struct head_sample s = solve(&memory, CLIP, (const double(*)[2])b, 3, now += 10 * NS_PER_MS);
     assert_int_equal(s.status, TRACKER_SEEN);
     assert_true(error_of(&there, &s) < 2 * whole_pixel_m);
@@ -209,13 +212,13 @@ static void a_moving_head_is_followed_without_a_flip(void **state)
         struct head_memory memory = {0};
         for (int i = 0; i < 200; i++) {
             double t = i * 0.02;
-            struct rigid head = head_at((struct vec3){0.12 * sin(t), 0.1 + 0.05 * cos(1.3 * t),
-                                                      0.65 + 0.1 * sin(0.7 * t)},
-                                        25 * sin(0.9 * t), -15 + 15 * sin(1.1 * t), 8 * sin(t));
+            struct rigid head = head_at(
+                (struct vec3){0.12 * sin(t), 0.1 + 0.05 * cos(1.3 * t), 0.65 + 0.1 * sin(0.7 * t)},
+                25 * sin(0.9 * t), -15 + 15 * sin(1.1 * t), 8 * sin(t));
             double blobs[3][2];
             see(&head, marker, 1, blobs);
-            struct head_sample s = solve(&memory, marker, (const double(*)[2])blobs, 3,
-                                         NS_PER_S + i * 20 * NS_PER_MS);
+            struct head_sample s =
+                solve(&memory, marker, (const double(*)[2])blobs, 3, NS_PER_S + i * 20 * NS_PER_MS);
             assert_int_equal(s.status, TRACKER_SEEN);
             assert_true(error_of(&head, &s) < 2 * whole_pixel_m);
         }
@@ -226,7 +229,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_clip_is_placed_exactly_from_exact_blobs),
-        cmocka_unit_test(a_head_turned_exactly_to_the_camera_is_placed_though_its_blobs_are_collinear),
+        cmocka_unit_test(
+            a_head_turned_exactly_to_the_camera_is_placed_though_its_blobs_are_collinear),
         cmocka_unit_test(half_pixel_blobs_place_the_eyes_within_three_millimetres),
         cmocka_unit_test(whole_pixel_blobs_place_the_eyes_within_six_millimetres),
         cmocka_unit_test(blobs_come_in_any_order_and_with_a_stray_light),

@@ -19,8 +19,9 @@ static const double noise_share = 0.1; // of sigma, from 400 readings
 
 // The wavelengths and the non-linearity of a real Flame-S.
 static const double flame_nm[4] = {189.80809, 0.38583738, -1.9762801e-05, -9.4763608e-10};
-static const char *const flame_bend[8] = {"8.93344e-01", "7.20663e-06", "-1.33919e-10", "-2.26498e-15",
-                                          "8.91163e-20", "4.24693e-25", "-2.89509e-29", "1.55269e-34"};
+static const char *const flame_bend[8] = {"8.93344e-01",  "7.20663e-06", "-1.33919e-10",
+                                          "-2.26498e-15", "8.91163e-20", "4.24693e-25",
+                                          "-2.89509e-29", "1.55269e-34"};
 
 typedef uint8_t slots[OCEAN_SLOTS][OCEAN_SLOT_BYTES];
 
@@ -160,9 +161,9 @@ static void a_spectrum_needs_its_length_and_its_sync_byte(void **state)
 static void a_calibration_that_makes_no_sense_is_refused_with_its_line(void **state)
 {
     (void)state;
-    const char *const bad[] = {"nm,uJ_per_count\n400,1e-5\n400,1e-5\n",
-                               "nm,uJ_per_count\n400,1e-5\n500,-1e-5\n",
-                               "nm,a,b\n400,1,2\n500,1,2\n", "nm,uJ_per_count\n100,1e-5\n150,1e-5\n"};
+    const char *const bad[] = {
+        "nm,uJ_per_count\n400,1e-5\n400,1e-5\n", "nm,uJ_per_count\n400,1e-5\n500,-1e-5\n",
+        "nm,a,b\n400,1,2\n500,1,2\n", "nm,uJ_per_count\n100,1e-5\n150,1e-5\n"};
     struct ocean_unit unit = unit_of();
     for (int i = 0; i < 4; i++) {
         struct table table = {0};
@@ -201,7 +202,8 @@ static void counts_become_the_irradiance_of_the_textbook(void **state)
     for (int nm = 400; nm <= 800; nm += 50) {
         double pixel = 0;
         for (int i = 0; i < 30; i++) // where the wavelength polynomial gives nm
-            pixel -= (flame_nm[0] + pixel * (flame_nm[1] + pixel * (flame_nm[2] + pixel * flame_nm[3])) - nm) /
+            pixel -= (flame_nm[0] +
+                      pixel * (flame_nm[1] + pixel * (flame_nm[2] + pixel * flame_nm[3])) - nm) /
                      (flame_nm[1] + pixel * (2 * flame_nm[2] + 3 * pixel * flame_nm[3]));
         double width = flame_nm[1] + 2 * flame_nm[2] * pixel + 3 * flame_nm[3] * pixel * pixel;
         double wanted = 1e-5 * counts / (11.95 * 0.1 * width);

@@ -6,9 +6,13 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "drivers/pr655.h"
+#include "drivers/udev.h"
 
 #include <cmocka.h>
 
@@ -48,9 +52,10 @@ static void a_status_names_its_remedy(void **state)
         int status;
         enum error_code code;
         const char *text;
-    } rows[] = {{-1, ERROR_RETRY, "-1"}, {-2, ERROR_RANGE, "overload"}, {-8, ERROR_RETRY, "weak"},
-                {-12, ERROR_RETRY, "timed out"}, {-1000, ERROR_DATA, "illegal"},
-                {-7, ERROR_RETRY, "-7"}, {-1035, ERROR_DATA, "-1035"}};
+    } rows[] = {{-1, ERROR_RETRY, "-1"},        {-2, ERROR_RANGE, "overload"},
+                {-8, ERROR_RETRY, "weak"},      {-12, ERROR_RETRY, "timed out"},
+                {-1000, ERROR_DATA, "illegal"}, {-7, ERROR_RETRY, "-7"},
+                {-1035, ERROR_DATA, "-1035"}};
     struct error err = {0};
     assert_true(pr655_check(0, &err));
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
@@ -68,8 +73,8 @@ static void a_point_is_two_numbers_and_nothing_else(void **state)
     assert_near(nm, 380, 0);
     assert_near(value, 1.234e-05, arithmetic);
     assert_true(pr655_point("0780.0, -1e-7 ", &nm, &value));
-    const char *const not_points[] = {"00000,0", "00000,0,560,1.2,3.4", "380", "380,", "380,abc",
-                                      "380,1,2", "", "nm,W"};
+    const char *const not_points[] = {
+        "00000,0", "00000,0,560,1.2,3.4", "380", "380,", "380,abc", "380,1,2", "", "nm,W"};
     for (size_t i = 0; i < sizeof not_points / sizeof *not_points; i++)
         assert_false(pr655_point(not_points[i], &nm, &value));
 }
@@ -108,10 +113,10 @@ static void a_spectrum_is_checked_by_its_content(void **state)
 // 'w' weak light, 'o' overload, 's' silence, 'c' cut short, 'j' junk.
 struct peer {
     const char *moods;
-    int step_nm;         // 4 as PR-655, 2 as PR-670
-    bool header_apart;   // status on a line of its own
+    int step_nm;       // 4 as PR-655, 2 as PR-670
+    bool header_apart; // status on a line of its own
     int measured, commands, left_remote, remote;
-    double scale;        // of the radiance, grows with each measurement
+    double scale; // of the radiance, grows with each measurement
 };
 
 static void say(struct pty *pty, const char *text)
@@ -127,8 +132,8 @@ static double radiance_at(double nm)
 static void send_spectrum(struct pty *pty, const struct peer *peer, bool cut)
 {
     char text[64];
-    say(pty, peer->header_apart ? "00000\r\n0,560,1.2e-1,3.4e17\r\n"
-                                : "00000,0,560,1.2e-1,3.4e17\r\n");
+    say(pty,
+        peer->header_apart ? "00000\r\n0,560,1.2e-1,3.4e17\r\n" : "00000,0,560,1.2e-1,3.4e17\r\n");
     for (int nm = 380; nm <= (cut ? 500 : 780); nm += peer->step_nm) {
         snprintf(text, sizeof text, "%d,%.5e\r\n", nm, peer->scale * radiance_at(nm));
         say(pty, text);
@@ -333,6 +338,28 @@ static void what_cannot_be_opened_says_why(void **state)
     driver()->close(NULL);
 }
 
+// A node that root alone may open, looked at by nobody.
+static void what_may_not_be_opened_names_the_udev_rules(void **state)
+{
+    (void)state;
+    char path[] = "/tmp/boothd-test-XXXXXX";
+    struct error err = {0};
+    int fd = mkstemp(path);
+    assert_true(fd >= 0);
+    close(fd);
+    assert_int_equal(chmod(path, 0), 0);
+    bool root = geteuid() == 0;
+    if (root)
+        assert_int_equal(seteuid(65534), 0);
+    void *opened = open_at(path, 1, &err);
+    if (root)
+        assert_int_equal(seteuid(0), 0);
+    unlink(path);
+    assert_null(opened);
+    assert_int_equal(err.code, ERROR_SYSTEM);
+    assert_non_null(strstr(err.text, UDEV_RULES_FILE));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -347,6 +374,7 @@ int main(void)
         cmocka_unit_test(silence_ends_at_the_deadline),
         cmocka_unit_test(characters_are_sent_one_by_one_with_gaps),
         cmocka_unit_test(what_cannot_be_opened_says_why),
+        cmocka_unit_test(what_may_not_be_opened_names_the_udev_rules),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

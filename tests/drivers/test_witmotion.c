@@ -9,8 +9,10 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include "drivers/udev.h"
 #include "drivers/witmotion.h"
 
 #include <cmocka.h>
@@ -37,7 +39,8 @@ static void tilt_is_right_at_all_quadrants(void **state)
     assert_near(fabs(tilt_of_gravity((struct vec3){0, 0, -9.81})), 180, arithmetic);
     for (int deg = -179; deg <= 179; deg++) {
         double a = deg * (M_PI / 180);
-        assert_near(tilt_of_gravity((struct vec3){0.3, 9.8 * sin(a), 9.8 * cos(a)}), deg, arithmetic);
+        assert_near(tilt_of_gravity((struct vec3){0.3, 9.8 * sin(a), 9.8 * cos(a)}), deg,
+                    arithmetic);
     }
 }
 
@@ -152,8 +155,8 @@ static struct sensor sensor_new(void)
     struct sensor s = {modbus_mapping_new(0, 0, 0x100, 0)};
     s.registers->tab_registers[0x2e] = 42;
     for (int i = 0; i < 6; i++)
-        s.registers->tab_registers[0x7f + i] = (uint16_t)("EMU1CLINOM01"[2 * i + 1] << 8 |
-                                                          "EMU1CLINOM01"[2 * i]);
+        s.registers->tab_registers[0x7f + i] =
+            (uint16_t)("EMU1CLINOM01"[2 * i + 1] << 8 | "EMU1CLINOM01"[2 * i]);
     set_pose(s.registers->tab_registers + 0x34, 30, 1, 30);
     return s;
 }
@@ -438,6 +441,29 @@ static void a_gateway_must_answer_for_the_unit_that_was_asked(void **state)
     }
 }
 
+// A node that root alone may open, looked at by nobody.
+static void what_may_not_be_opened_names_the_udev_rules(void **state)
+{
+    (void)state;
+    char path[] = "/tmp/boothd-test-XXXXXX";
+    struct error err = {0};
+    int fd = mkstemp(path);
+    assert_true(fd >= 0);
+    close(fd);
+    assert_int_equal(chmod(path, 0), 0);
+    bool root = geteuid() == 0;
+    if (root)
+        assert_int_equal(seteuid(65534), 0);
+    struct accelerometer_options options = options_for(path);
+    void *opened = driver()->open(&options, soon(), &err);
+    if (root)
+        assert_int_equal(seteuid(0), 0);
+    unlink(path);
+    assert_null(opened);
+    assert_int_equal(err.code, ERROR_SYSTEM);
+    assert_non_null(strstr(err.text, UDEV_RULES_FILE));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -451,6 +477,7 @@ int main(void)
         cmocka_unit_test(a_bad_line_costs_readings_and_no_more),
         cmocka_unit_test(a_silent_sensor_is_given_up_by_the_deadline),
         cmocka_unit_test(a_port_that_cannot_be_is_told_apart_from_one_that_is_absent),
+        cmocka_unit_test(what_may_not_be_opened_names_the_udev_rules),
         cmocka_unit_test(a_gateway_must_answer_for_the_unit_that_was_asked),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -18,8 +18,8 @@ static void *run(void *context)
 bool pty_start(struct pty *pty, void (*peer)(struct pty *pty, void *context), void *context)
 {
     struct termios t;
-    *pty = (struct pty){.master = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC), .peer = peer,
-                        .context = context};
+    *pty = (struct pty){
+        .master = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC), .peer = peer, .context = context};
     if (pty->master < 0 || grantpt(pty->master) != 0 || unlockpt(pty->master) != 0 ||
         ptsname_r(pty->master, pty->path, sizeof pty->path) != 0)
         return false;
