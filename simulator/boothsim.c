@@ -225,6 +225,7 @@ static bool plug_in(struct booth *b, struct error *err)
         .radiometer_hurry = s->radiometer.hurry,
         .collector_mm2 = s->spectrometer.collector_mm2,
         .calibration_error = s->spectrometer.calibration_error,
+        .camera_pitch_deg = s->camera.pitch_deg,
     };
     b->wire = wire_start(&options, err);
     return b->wire || while_doing(err, "plugging the instruments in");
