@@ -125,17 +125,24 @@ bool world_add_now(struct world *world, int64_t now_ns, struct event event, stru
     return world_add(world, &event, err);
 }
 
+// Faults are told without the lock: replugging senses the world.
 void world_faults_due(struct world *world, int64_t now_ns, world_fault *fault, void *context)
 {
     double until = world_seconds(world, now_ns);
     pthread_mutex_lock(&world->lock);
-    for (int i = 0; i < world->count; i++) {
+    struct event *due = calloc(world->count + 1, sizeof *due);
+    int count = 0;
+    for (int i = 0; due && i < world->count; i++) {
         const struct event *e = &world->events[i];
         if (e->kind == EVENT_FAULT && e->at_s > world->faults_until_s && e->at_s <= until)
-            fault(context, e->instrument, e->fault);
+            due[count++] = *e;
     }
-    world->faults_until_s = fmax(until, world->faults_until_s);
+    if (due)
+        world->faults_until_s = fmax(until, world->faults_until_s);
     pthread_mutex_unlock(&world->lock);
+    for (int i = 0; i < count; i++)
+        fault(context, due[i].instrument, due[i].fault);
+    free(due);
 }
 
 // A value on its way from one place to another, gently at both ends.

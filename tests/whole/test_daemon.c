@@ -7,6 +7,7 @@
 #include "tests/fakes/folder.h"
 #include "tests/fakes/manager.h"
 #include "tests/whole/picture.h"
+#include "tests/whole/proof_files.h"
 #include "tests/whole/running.h"
 
 enum { WIDTH = 160, HEIGHT = 100, CALL_MS = 60000 };
@@ -24,19 +25,6 @@ static struct manager manager;
 static pid_t daemon_pid;
 static struct control_client *client;
 
-static void put_spectrum(FILE *out, const struct spectrum *s)
-{
-    fprintf(out, "SPECT\n\nSPECTRAL_BANDS \"471\"\nSPECTRAL_START_NM \"360\"\n"
-                 "SPECTRAL_END_NM \"830\"\nSPECTRAL_NORM \"1\"\nNUMBER_OF_FIELDS 471\n"
-                 "BEGIN_DATA_FORMAT\n");
-    for (int i = 0; i < SPECTRUM_COUNT; i++)
-        fprintf(out, "SPEC_%d ", SPECTRUM_FIRST_NM + i);
-    fprintf(out, "\nEND_DATA_FORMAT\nNUMBER_OF_SETS 1\nBEGIN_DATA\n");
-    for (int i = 0; i < SPECTRUM_COUNT; i++)
-        fprintf(out, "%.9g ", s->v[i]);
-    fprintf(out, "\nEND_DATA\n");
-}
-
 static void put_lamp(void)
 {
     struct spectrum even;
@@ -45,9 +33,7 @@ static void put_lamp(void)
     mkdir(folder_at(&here, "lamps"), 0755);
     for (int i = 0; i < SPECTRUM_COUNT; i++)
         even.v[i] = 0.02;
-    FILE *out = fopen(folder_at(&here, "lamps/even.sp"), "w");
-    put_spectrum(out, &even);
-    fclose(out);
+    write_spectrum(folder_at(&here, "lamps/even.sp"), &even);
     snprintf(facts, sizeof facts,
              "[lamp]\nname = even\nspectrum = even.sp\ntaught_lux = %.9g\nmap = even.exr\n",
              xyz_absolute(&even, OBSERVER_1931_2).Y);
@@ -60,23 +46,9 @@ static void put_lamp(void)
     exr_fini(&map);
 }
 
-// sRGB primaries at full white, each channel code^2.2 between nodes k/1020.
 static void put_display(const char *name)
 {
-    static const double primaries[3][3] = {{0.4124, 0.3576, 0.1805},
-                                           {0.2126, 0.7152, 0.0722},
-                                           {0.0193, 0.1192, 0.9505}};
-    FILE *out = fopen(folder_at(&here, name), "w");
-    fprintf(out, "[display]\nname = test panel\n[matrix]\n");
-    for (int i = 0; i < 3; i++)
-        fprintf(out, "%c = %.9g %.9g %.9g 0\n", "XYZ"[i], WHITE_CDM2 * primaries[i][0],
-                WHITE_CDM2 * primaries[i][1], WHITE_CDM2 * primaries[i][2]);
-    fprintf(out, "[curves]\n");
-    for (int k = 0; k < 1021; k++) {
-        double v = pow(k / 1020.0, 2.2);
-        fprintf(out, "node_%04d = %.17g %.17g %.17g\n", k, v, v, v);
-    }
-    fclose(out);
+    write_display(folder_at(&here, name), WHITE_CDM2);
 }
 
 static const char *settings_text(const char *more)
