@@ -103,7 +103,7 @@ static const struct setting quality_rows[] = {
      "How surface meets lamp: full spectra where known (auto), bands, product, full."},
     {"bands", SETTING_INT, AT(quality.bands), 0, BANDS_LEAST, BANDS_MOST, "", NULL, "6",
      "Number of spectral bands."},
-    {"lights", SETTING_INT, AT(quality.lights), 0, 1, 4096, "", NULL, "64",
+    {"lights", SETTING_INT, AT(quality.lights), 0, 1, 4096, "", NULL, "128",
      "Light points that stand for the ceiling."},
     {"cut", SETTING_ENUM, AT(quality.cut), 0, 0, 0, "", cut_names, "variance",
      "How the ceiling is cut into light points."},

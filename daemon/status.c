@@ -210,11 +210,16 @@ static json_t *settings_json(const struct snapshot *s)
     return out;
 }
 
+static bool believed(const struct belief *b)
+{
+    return b->standing == STANDING_FRESH || b->standing == STANDING_HELD;
+}
+
 static bool valid(const struct snapshot *s)
 {
     return s->scene == SCENE_SURFACE && s->state.lamp.verdict == LAMP_KNOWN &&
-           s->state.lamp.belief.standing == STANDING_FRESH &&
-           s->state.tilt.belief.standing == STANDING_FRESH;
+           believed(&s->state.lamp.belief) &&
+           (believed(&s->state.tilt.belief) || !booth_accelerometer(&s->settings));
 }
 
 static json_t *warnings_json(const struct snapshot *s)

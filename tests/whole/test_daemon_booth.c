@@ -364,10 +364,18 @@ static void others_are_served_while_the_radiometer_is_silent(void **state)
     json_decref(reply);
 }
 
-static void quitting_ends_daemon_and_booth(void **state)
+static void quitting_ends_daemon_and_booth_even_while_the_radiometer_is_awaited(void **state)
 {
     (void)state;
+    struct error err = {0};
+    struct control_client *patient = control_connect(folder_at(&here, "run/boothd.sock"), &err);
+    assert_non_null(patient);
+    fault("radiometer", "silent");
+    assert_null(control_call(patient, json_pack("{ss,sf}", "do", "measure", "timeout_s", 600.0), 1,
+                             &err));
+    json_decref(ask(json_pack("{ss}", "do", "status"))); // behind it in the queue of requests
     json_decref(ask(json_pack("{ss}", "do", "quit")));
+    control_close(patient);
     int status = await_program(booth_pid);
     booth_pid = 0;
     if (status) {
@@ -389,7 +397,7 @@ int main(void)
         cmocka_unit_test(an_unplugged_spectrometer_leaves_the_lamp_and_comes_back),
         cmocka_unit_test(an_unplugged_inclinometer_and_a_camera_come_back_too),
         cmocka_unit_test(others_are_served_while_the_radiometer_is_silent),
-        cmocka_unit_test(quitting_ends_daemon_and_booth),
+        cmocka_unit_test(quitting_ends_daemon_and_booth_even_while_the_radiometer_is_awaited),
     };
     return cmocka_run_group_tests(tests, open_booth, close_booth);
 }
