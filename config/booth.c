@@ -185,10 +185,10 @@ static void driver_section(struct gathering *g, const char *name, size_t driver_
                            const char *const *names, const struct setting *options,
                            size_t options_at, const struct setting *more)
 {
-    const struct setting driver[] = {
-        {"driver", SETTING_ENUM, driver_at, 0, 0, 0, "", names, names[1] ? names[1] : "none",
-         "Which kind of instrument it is."},
-        {0}};
+    const struct setting driver[] = {{"driver", SETTING_ENUM, driver_at, 0, 0, 0, "", names,
+                                      names[1] ? names[1] : "none",
+                                      "Which kind of instrument it is."},
+                                     {0}};
     begin(g, name);
     append(g, driver, 0);
     append(g, options, options_at);

@@ -54,9 +54,9 @@ struct booth_settings {
     struct {
         int driver;
         struct tracker_options options;
-        double place_m[3];                    // of the camera, booth frame
-        double pitch_deg, yaw_deg, roll_deg;  // see booth_from_tracker
-        double default_eye_m[3];              // until the tracker has spoken
+        double place_m[3];                   // of the camera, booth frame
+        double pitch_deg, yaw_deg, roll_deg; // see booth_from_tracker
+        double default_eye_m[3];             // until the tracker has spoken
     } tracker;
     struct {
         int driver;

@@ -86,9 +86,10 @@ static bool chart(const struct material_file *f, struct material *out, struct er
     int behind = 0, patches = f->columns * f->rows;
     if (!reflectances_load(f->source, &s, err))
         return false;
-    bool fine = patches <= s.count ||
-                fail(err, ERROR_CONFIG, "columns and rows: %d x %d is more than the %d spectra of %s",
-                     f->columns, f->rows, s.count, f->source);
+    bool fine =
+        patches <= s.count ||
+        fail(err, ERROR_CONFIG, "columns and rows: %d x %d is more than the %d spectra of %s",
+             f->columns, f->rows, s.count, f->source);
     fine = fine && background(&s, f->background, &behind, err) &&
            material_chart(f->name, s.spectra, s.names, s.count, f->columns, f->rows, f->gap, behind,
                           out, err);
@@ -153,8 +154,8 @@ static bool unknown(const char *folder, const char *name, struct error *err)
 bool material_load(const struct booth_settings *booth, const char *name_or_path,
                    struct material *out, struct error *err)
 {
-    const char *folder = *booth->materials.folder ? booth->materials.folder
-                                                  : booth_shipped_materials();
+    const char *folder =
+        *booth->materials.folder ? booth->materials.folder : booth_shipped_materials();
     char path[PATH_MAX];
     struct material_file file;
     const struct settings_section sections[] = {{"material", material_file_settings, &file}, {0}};

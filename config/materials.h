@@ -10,12 +10,12 @@ enum material_kind { MATERIAL_CHART, MATERIAL_FLAT, MATERIAL_BANDS };
 // Section [material] of NAME.ini.
 struct material_file {
     char name[64];
-    int kind;           // enum material_kind
-    char source[512];   // chart, flat: table of spectra; bands: EXR; relative to the file
-    double reflectance; // flat without a source: the same at all wavelengths, 0..1
-    int columns, rows;  // of a chart, 1..64
-    double gap;         // of a chart, in widths of a patch, 0..0.5
-    char background[64]; // of a chart: name of a spectrum of source, or a reflectance 0..1
+    int kind;                 // enum material_kind
+    char source[512];         // chart, flat: table of spectra; bands: EXR; relative to the file
+    double reflectance;       // flat without a source: the same at all wavelengths, 0..1
+    int columns, rows;        // of a chart, 1..64
+    double gap;               // of a chart, in widths of a patch, 0..0.5
+    char background[64];      // of a chart: name of a spectrum of source, or a reflectance 0..1
     double width_m, height_m; // how it lies on the screen; 0 = fills it
 };
 

@@ -12,8 +12,8 @@
 static const int64_t OPEN_WITHIN_NS = 3 * NS_PER_S;
 static const int64_t FIRST_REST_NS = 200 * NS_PER_MS;
 static const int64_t LONGEST_REST_NS = 5 * NS_PER_S;
-static const int64_t SILENT_AFTER_NS = 5 * NS_PER_S;   // without a sample it is reported
-static const int64_t REOPEN_AFTER_NS = 15 * NS_PER_S;  // without a sample it is opened anew
+static const int64_t SILENT_AFTER_NS = 5 * NS_PER_S;  // without a sample it is reported
+static const int64_t REOPEN_AFTER_NS = 15 * NS_PER_S; // without a sample it is opened anew
 
 // A driver of any kind, its types put aside.
 struct face {
@@ -104,9 +104,15 @@ const char *instrument_state_name(enum instrument_state state)
     }                                                                                              \
     static struct face kind##_face(const struct acquire_from *from)                                \
     {                                                                                              \
-        return (struct face){from->kind ? from->kind->name : NULL, kind##_open,  kind##_read,      \
-                             kind##_identify,                      kind##_close, kind##_patience,  \
-                             kind##_taken,                         kind##_note,  sizeof(type)};    \
+        return (struct face){from->kind ? from->kind->name : NULL,                                 \
+                             kind##_open,                                                          \
+                             kind##_read,                                                          \
+                             kind##_identify,                                                      \
+                             kind##_close,                                                         \
+                             kind##_patience,                                                      \
+                             kind##_taken,                                                         \
+                             kind##_note,                                                          \
+                             sizeof(type)};                                                        \
     }
 
 static int64_t spectrometer_patience(const void *sample)
@@ -149,8 +155,8 @@ FACE(tracker, struct head_sample)
 struct acquire_from acquire_from(const struct booth_settings *b)
 {
     return (struct acquire_from){
-        booth_spectrometer(b),  b->spectrometer.options,  booth_accelerometer(b),
-        b->accelerometer.options, booth_tracker(b), b->tracker.options,
+        booth_spectrometer(b),    b->spectrometer.options, booth_accelerometer(b),
+        b->accelerometer.options, booth_tracker(b),        b->tracker.options,
     };
 }
 
@@ -274,7 +280,8 @@ static bool start(struct acquire *a, enum instrument instrument, struct face fac
     w->report.state = INSTRUMENT_IS_SILENT;
     fail(&w->report.error, ERROR_RETRY, "being opened");
     w->started = !pthread_create(&w->thread, NULL, work, w);
-    return w->started || fail(err, ERROR_SYSTEM, "no thread for the %s", instrument_name(instrument));
+    return w->started ||
+           fail(err, ERROR_SYSTEM, "no thread for the %s", instrument_name(instrument));
 }
 
 struct acquire *acquire_start(const struct acquire_from *from, struct error *err)

@@ -18,7 +18,8 @@ static json_t *ask(struct ctl *c, struct error *err)
 {
     struct control_client *client = NULL;
     json_t *reply = NULL;
-    if (*c->socket || booth_socket_default(getenv("XDG_RUNTIME_DIR"), c->socket, sizeof c->socket, err))
+    if (*c->socket ||
+        booth_socket_default(getenv("XDG_RUNTIME_DIR"), c->socket, sizeof c->socket, err))
         client = control_connect(c->socket, err);
     if (client)
         reply = control_call(client, c->request, ctl_timeout_ms(c), err);

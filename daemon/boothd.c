@@ -86,8 +86,8 @@ static bool open_renderer(struct booth *b, struct error *err)
     memcpy(options.monitor, settings->display.monitor, sizeof options.monitor);
     b->renderer = renderer_create(&options, err);
     if (b->renderer)
-        log_line(LOG_LEVEL_INFO, "drawing %s with %s", options.window ? "in a window" : "off screen",
-                 renderer_name(b->renderer));
+        log_line(LOG_LEVEL_INFO, "drawing %s with %s",
+                 options.window ? "in a window" : "off screen", renderer_name(b->renderer));
     return b->renderer;
 }
 

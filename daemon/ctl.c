@@ -30,8 +30,15 @@ const char ctl_help[] =
     "Ends with 0; 1 when it failed; 2 on wrong usage or input; 3 when done, with\n"
     "a warning.\n";
 
-enum { OPTION_SOCKET = 256, OPTION_JSON, OPTION_TIMEOUT, OPTION_PATCH, OPTION_READINGS,
-       OPTION_VERSION, OPTION_HELP };
+enum {
+    OPTION_SOCKET = 256,
+    OPTION_JSON,
+    OPTION_TIMEOUT,
+    OPTION_PATCH,
+    OPTION_READINGS,
+    OPTION_VERSION,
+    OPTION_HELP
+};
 
 static const struct option long_options[] = {
     {"socket", required_argument, NULL, OPTION_SOCKET},
@@ -160,8 +167,9 @@ static bool take_option(int option, const char *value, struct words *words, stru
     case OPTION_HELP:
         return c->help = true;
     default:
-        return fail(err, ERROR_CONFIG, "an option is unknown or its value is missing; see "
-                                       "boothctl --help");
+        return fail(err, ERROR_CONFIG,
+                    "an option is unknown or its value is missing; see "
+                    "boothctl --help");
     }
 }
 
@@ -276,8 +284,7 @@ static void print_status(const json_t *s, FILE *out)
     json_t *i;
     fprintf(out, "%s, boothd %s since %s%s\n", text(s, "booth"), text(s, "version"),
             text(s, "since"), json_is_true(json_object_get(s, "emulated")) ? ", EMULATED" : "");
-    json_object_foreach(json_object_get(s, "instruments"), name, i)
-        print_instrument(name, i, out);
+    json_object_foreach(json_object_get(s, "instruments"), name, i) print_instrument(name, i, out);
     print_lamp(json_object_get(s, "lamp"), out);
     const json_t *tilt = json_object_get(s, "tilt"), *eye = json_object_get(s, "eye");
     fprintf(out, "tilt           %.2f degrees, %s\n", real(tilt, "tilt_deg"),
@@ -299,8 +306,7 @@ static void print_measure(const json_t *r, FILE *out)
     fputs("XYZ ", out);
     triple(r, "XYZ", "%.4f", out);
     fprintf(out, " cd/m2, %s %s%s, %s\n", text(r, "instrument"), text(r, "serial"),
-            json_is_true(json_object_get(r, "emulated")) ? " (emulated)" : "",
-            text(r, "taken_at"));
+            json_is_true(json_object_get(r, "emulated")) ? " (emulated)" : "", text(r, "taken_at"));
 }
 
 static void print_probe(const json_t *r, FILE *out)

@@ -10,11 +10,11 @@
 #include "base/error.h"
 
 struct ctl {
-    char socket[108];  // "" = the default one
+    char socket[108]; // "" = the default one
     bool json, help, version;
-    double timeout_s;  // 0 = as long as the command may take
-    json_t *request;   // owned
-    const char *what;  // "status", …
+    double timeout_s; // 0 = as long as the command may take
+    json_t *request;  // owned
+    const char *what; // "status", …
 };
 
 // Errors: CONFIG (usage) and RANGE (a value), one line.

@@ -55,7 +55,8 @@ static bool radiometer_there(struct desk *d, int64_t deadline_ns, struct error *
     if (d->device)
         return true;
     int64_t within_ns = clock_now_ns() + OPEN_WITHIN_NS;
-    d->device = d->driver->open(&d->options, within_ns < deadline_ns ? within_ns : deadline_ns, err);
+    d->device =
+        d->driver->open(&d->options, within_ns < deadline_ns ? within_ns : deadline_ns, err);
     if (!d->device) {
         report(d, INSTRUMENT_IS_WAITING, err);
         return false;
@@ -182,10 +183,10 @@ static void teach(struct desk *d, struct job *job)
         json_t *nm = json_array();
         for (int i = 0; i < SPECTRUM_COUNT; i++)
             json_array_append_new(nm, json_integer(SPECTRUM_FIRST_NM + i));
-        job->reply = json_pack("{s:s, s:i, s:o, s:o, s:f, s:f}", "lamp", job->name, "readings",
-                               job->readings, "nm", nm, "irradiance",
-                               numbers(mean.v, SPECTRUM_COUNT), "spread", spread, "lux",
-                               xyz_absolute(&mean, OBSERVER_1931_2).Y);
+        job->reply =
+            json_pack("{s:s, s:i, s:o, s:o, s:f, s:f}", "lamp", job->name, "readings",
+                      job->readings, "nm", nm, "irradiance", numbers(mean.v, SPECTRUM_COUNT),
+                      "spread", spread, "lux", xyz_absolute(&mean, OBSERVER_1931_2).Y);
         add_identity(job->reply, &from.identity);
     }
     free(readings);

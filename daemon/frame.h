@@ -12,10 +12,10 @@ struct booth {
     struct setup *setup;
     struct renderer *renderer;
     struct estimator estimator;
-    struct state state; // believed now
-    struct state shown; // of the last frame drawn
-    struct scene scene; // of the last frame, pointers into setup
-    uint64_t frames;    // drawn since the start
+    struct state state;  // believed now
+    struct state shown;  // of the last frame drawn
+    struct scene scene;  // of the last frame, pointers into setup
+    uint64_t frames;     // drawn since the start
     double out_of_gamut; // share of the last frame drawn, 0..1
 };
 

@@ -83,7 +83,8 @@ bool options_parse(int argc, char **argv, const char *config_home, const char *h
     opterr = 0;
     while ((option = getopt_long(argc, argv, "", long_options, NULL)) != -1) {
         if (option == '?')
-            return fail(err, ERROR_CONFIG, "%s: unknown, or its value is missing; see boothd --help",
+            return fail(err, ERROR_CONFIG,
+                        "%s: unknown, or its value is missing; see boothd --help",
                         argv[optind - 1]);
         if (!take(option, optarg, o, err))
             return false;

@@ -19,7 +19,7 @@ struct boothd_options {
     enum boothd_mode mode;
     bool verbose;
     char config[512];
-    char socket[108]; // "" = as the settings say
+    char socket[108];           // "" = as the settings say
     struct setup_source source; // path points to config
 };
 

@@ -23,10 +23,10 @@ static json_t *shown_reply(const struct booth *b)
     json_t *warnings = json_array();
     char text[256];
     if (b->scene.kind == SCENE_DARK && b->setup->show == SHOW_MATERIAL)
-        json_array_append_new(warnings,
-                              json_string(b->state.lamp.index < 0
-                                              ? "no lamp is known now: the screen stays dark"
-                                              : "the proof is not possible: the screen stays dark"));
+        json_array_append_new(
+            warnings, json_string(b->state.lamp.index < 0
+                                      ? "no lamp is known now: the screen stays dark"
+                                      : "the proof is not possible: the screen stays dark"));
     for (int i = 0; setup_warning(b->setup, i, text, sizeof text); i++)
         json_array_append_new(warnings, json_string(text));
     json_object_set_new(reply, "warnings", warnings);
@@ -84,8 +84,7 @@ static void probe(struct booth *b, struct job *job)
         "{s:f, s:[f,f,f], s:[f,f,f], s:[f,f,f], s:[f,f,f], s:b}", "lux", p.illuminance, "surface",
         p.surface.X, p.surface.Y, p.surface.Z, "emitted", p.emitted.X, p.emitted.Y, p.emitted.Z,
         "rgb", p.inverse.counts.r, p.inverse.counts.g, p.inverse.counts.b, "linear",
-        p.inverse.linear.r, p.inverse.linear.g, p.inverse.linear.b, "in_gamut",
-        p.inverse.in_gamut);
+        p.inverse.linear.r, p.inverse.linear.g, p.inverse.linear.b, "in_gamut", p.inverse.in_gamut);
 }
 
 // Settings that were given away at the start.
@@ -93,10 +92,10 @@ static bool counts_at_start_only(const char *section, const char *key)
 {
     static const char *const sections[] = {"screen", "spectrometer", "accelerometer", "radiometer",
                                            "control"};
-    static const char *const keys[] = {"display.output",  "display.monitor", "display.fullscreen",
-                                       "display.bits",    "tracker.driver",  "tracker.serial",
-                                       "tracker.fov_deg", "tracker.sensitivity", "tracker.marker",
-                                       "tracker.eye_from_marker_m"};
+    static const char *const keys[] = {
+        "display.output", "display.monitor",          "display.fullscreen", "display.bits",
+        "tracker.driver", "tracker.serial",           "tracker.fov_deg",    "tracker.sensitivity",
+        "tracker.marker", "tracker.eye_from_marker_m"};
     char whole[96];
     snprintf(whole, sizeof whole, "%s.%s", section, key);
     for (size_t i = 0; i < sizeof sections / sizeof *sections; i++)
@@ -159,8 +158,7 @@ static void reload(struct booth *b, const struct setup_source *source, struct jo
     log_line(LOG_LEVEL_NOTICE, "reloaded %s", source->path);
 }
 
-void request_do(struct booth *b, const struct setup_source *source, struct job *job,
-                int64_t now_ns)
+void request_do(struct booth *b, const struct setup_source *source, struct job *job, int64_t now_ns)
 {
     switch (job->kind) {
     case JOB_SHOW:

@@ -131,9 +131,9 @@ static bool bake(struct setup *s, int lamp, struct error *err)
     if (s->texels && s->baked_lamp == lamp)
         return true;
     struct xyz white;
-    float *texels = material_bake(&s->material, &s->lamps.lamps[lamp].irradiance,
-                                  s->settings.quality.observer, s->settings.quality.spectral,
-                                  s->settings.quality.bands, &white, err);
+    float *texels =
+        material_bake(&s->material, &s->lamps.lamps[lamp].irradiance, s->settings.quality.observer,
+                      s->settings.quality.spectral, s->settings.quality.bands, &white, err);
     if (!texels)
         return while_doing(err, "showing %s under %s", s->material_name,
                            s->lamps.lamps[lamp].file.name);
@@ -214,7 +214,8 @@ bool setup_warning(const struct setup *s, int index, char *text, size_t size)
         return true;
     }
     if (s->has_display && s->display.condition > CONDITION_WARNING && index-- == 0) {
-        snprintf(text, size, "the display's primaries are close together: condition %.1f is above %g",
+        snprintf(text, size,
+                 "the display's primaries are close together: condition %.1f is above %g",
                  s->display.condition, CONDITION_WARNING);
         return true;
     }

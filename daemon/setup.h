@@ -27,12 +27,12 @@ struct setup {
     struct display_model display;
     uint64_t display_generation;
     struct lamps lamps;
-    struct light_points *lights;  // per lamp; count 0 without a luminance map
-    uint64_t lights_generation;   // of lamp 0; lamp i has i more
+    struct light_points *lights; // per lamp; count 0 without a luminance map
+    uint64_t lights_generation;  // of lamp 0; lamp i has i more
     enum show_kind show;
-    struct counts counts;         // PATCH
-    char material_name[512];      // as asked for
-    char patch_name[64];          // "" = whole
+    struct counts counts;    // PATCH
+    char material_name[512]; // as asked for
+    char patch_name[64];     // "" = whole
     struct material material;
     float *texels; // baked, NULL = not for any lamp
     struct xyz white;

@@ -232,8 +232,7 @@ struct state estimate(struct estimator *e, const struct samples *seen, int64_t n
     e->state.lamp.belief = believe(&e->lamp, e->limits.lamp_hold_s, now_ns);
     e->state.tilt.belief = believe(&e->tilt, e->limits.tilt_hold_s, now_ns);
     e->state.eye.belief = believe(&e->eye, e->limits.eye_hold_s, now_ns);
-    if (e->state.lamp.verdict == LAMP_UNKNOWN &&
-        e->state.lamp.belief.standing != STANDING_HELD) {
+    if (e->state.lamp.verdict == LAMP_UNKNOWN && e->state.lamp.belief.standing != STANDING_HELD) {
         e->state.lamp.index = -1;
         e->state.lamp.level = 0;
     }

@@ -41,10 +41,10 @@ struct state {
     struct {
         struct belief belief;
         enum lamp_verdict verdict; // of the newest readings
-        int index;       // lamp to proof under, -1 = none
-        double level;    // smoothed live over taught level of that lamp
-        double lux;      // live, at the spectrometer
-        double distance; // to the nearest taught lamp
+        int index;                 // lamp to proof under, -1 = none
+        double level;              // smoothed live over taught level of that lamp
+        double lux;                // live, at the spectrometer
+        double distance;           // to the nearest taught lamp
     } lamp;
     struct {
         struct belief belief;
@@ -58,10 +58,10 @@ struct state {
 
 // What one instrument's belief remembers.
 struct memory {
-    uint64_t number;    // of the last sample looked at
-    int64_t seen_ns;    // latest instant of the last good sample; valid when ever
-    bool ever, usable;  // a good sample was ever seen; the newest one was good
-    double confidence;  // of the last good sample
+    uint64_t number;   // of the last sample looked at
+    int64_t seen_ns;   // latest instant of the last good sample; valid when ever
+    bool ever, usable; // a good sample was ever seen; the newest one was good
+    double confidence; // of the last good sample
 };
 
 // Plain data, owned by the main thread.

@@ -51,8 +51,8 @@ static void warn_of_lamp(struct snapshot *s)
         return;
     case LAMP_UNKNOWN:
         if (*s->lamp_name)
-            warn(s, "the light is unknown or mixed: %s is held, last seen %.1f s ago",
-                 s->lamp_name, seconds(s->state.lamp.belief.age_ns));
+            warn(s, "the light is unknown or mixed: %s is held, last seen %.1f s ago", s->lamp_name,
+                 seconds(s->state.lamp.belief.age_ns));
         else
             warn(s, "the light is unknown or mixed: no proof is shown under it");
         return;
@@ -132,12 +132,12 @@ static const char *verdict_name(enum lamp_verdict verdict)
 
 void snapshot_line(const struct snapshot *s, char *text, size_t size)
 {
-    const char *lamp = *s->lamp_name ? s->lamp_name
+    const char *lamp = *s->lamp_name                           ? s->lamp_name
                        : s->state.lamp.verdict == LAMP_UNKNOWN ? "unknown light"
                                                                : "no lamp";
-    const char *shown = s->scene == SCENE_PATCH    ? "a patch of counts"
-                        : s->scene == SCENE_DARK   ? "nothing"
-                                                   : s->material;
+    const char *shown = s->scene == SCENE_PATCH  ? "a patch of counts"
+                        : s->scene == SCENE_DARK ? "nothing"
+                                                 : s->material;
     snprintf(text, size, "%s, tilt %.0f degrees, %s on screen", lamp, s->state.tilt.deg, shown);
 }
 
@@ -155,11 +155,10 @@ static json_t *belief_json(const struct belief *b)
 static json_t *lamp_json(const struct snapshot *s)
 {
     json_t *lamp = belief_json(&s->state.lamp.belief);
-    json_t *more = json_pack("{s:s, s:o, s:f, s:f, s:f, s:i}", "verdict",
-                             verdict_name(s->state.lamp.verdict), "name",
-                             text_or_null(s->lamp_name), "level", s->state.lamp.level, "lux",
-                             s->state.lamp.lux, "distance", s->state.lamp.distance, "taught",
-                             s->lamps);
+    json_t *more =
+        json_pack("{s:s, s:o, s:f, s:f, s:f, s:i}", "verdict", verdict_name(s->state.lamp.verdict),
+                  "name", text_or_null(s->lamp_name), "level", s->state.lamp.level, "lux",
+                  s->state.lamp.lux, "distance", s->state.lamp.distance, "taught", s->lamps);
     json_object_update(lamp, more);
     json_decref(more);
     return lamp;
@@ -267,9 +266,9 @@ static json_t *eye_json(const struct snapshot *s)
 json_t *status_json(const struct snapshot *s, const struct instruments_report *instruments,
                     const char *since, int64_t now_ns)
 {
-    json_t *out = json_pack("{s:s, s:s, s:s, s:b, s:b}", "version", BOOTHD_VERSION, "since", since,
-                            "booth", s->settings.booth.name, "emulated",
-                            emulated(s, instruments), "valid", valid(s));
+    json_t *out =
+        json_pack("{s:s, s:s, s:s, s:b, s:b}", "version", BOOTHD_VERSION, "since", since, "booth",
+                  s->settings.booth.name, "emulated", emulated(s, instruments), "valid", valid(s));
     json_object_set_new(out, "instruments", instruments_json(instruments, now_ns));
     json_object_set_new(out, "lamp", lamp_json(s));
     json_object_set_new(out, "tilt", tilt_json(s));

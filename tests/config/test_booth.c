@@ -130,9 +130,10 @@ static void a_path_that_does_not_fit_is_refused(void **state)
     struct booth_settings b;
     struct error err = {0};
     char text[2048];
-    snprintf(text, sizeof text, "%s[control]\nsocket = %.*s\n", NEEDED, 100,
-             "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa"
-             "aaaaaaaaaaaaaaaaaaaa");
+    snprintf(
+        text, sizeof text, "%s[control]\nsocket = %.*s\n", NEEDED, 100,
+        "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa"
+        "aaaaaaaaaaaaaaaaaaaa");
     assert_false(load(text, &b, &err));
     assert_holds(err.text, "socket");
     assert_holds(err.text, "107");

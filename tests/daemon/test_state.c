@@ -99,8 +99,8 @@ static struct state read_tilt(struct world *w, double deg, bool plausible)
 {
     w->now_ns += 50 * NS_PER_MS;
     w->seen.tilt_number++;
-    w->seen.tilt = (struct tilt_sample){
-        .taken = just_now(w), .tilt_deg = deg, .plausible = plausible};
+    w->seen.tilt =
+        (struct tilt_sample){.taken = just_now(w), .tilt_deg = deg, .plausible = plausible};
     return pass(w, 0);
 }
 
@@ -108,8 +108,8 @@ static struct state read_head(struct world *w, struct vec3 eye, enum tracker_sta
 {
     w->now_ns += 10 * NS_PER_MS;
     w->seen.head_number++;
-    w->seen.head = (struct head_sample){
-        .taken = just_now(w), .status = status, .eye = eye, .markers = 3};
+    w->seen.head =
+        (struct head_sample){.taken = just_now(w), .status = status, .eye = eye, .markers = 3};
     return pass(w, 0);
 }
 
@@ -284,7 +284,7 @@ static void a_slow_creep_of_the_tilt_is_followed(void **state)
 {
     struct world *w = *state;
     for (int i = 0; i <= 200; i++)
-        read_tilt(w, 20 + 0.01 * i, true); // 0.2 degrees a second
+        read_tilt(w, 20 + 0.01 * i, true);                // 0.2 degrees a second
     assert_near(w->state.tilt.deg, 22, 0.2 * 0.2 + 0.01); // behind by one time constant
 }
 
@@ -357,9 +357,10 @@ static void a_sample_older_than_the_last_one_is_passed_over(void **state)
     struct world *w = *state;
     read_tilt(w, 20, true);
     w->seen.tilt_number++;
-    w->seen.tilt = (struct tilt_sample){.taken = {w->now_ns - 5 * NS_PER_S, w->now_ns - 5 * NS_PER_S},
-                                        .tilt_deg = 60,
-                                        .plausible = true};
+    w->seen.tilt =
+        (struct tilt_sample){.taken = {w->now_ns - 5 * NS_PER_S, w->now_ns - 5 * NS_PER_S},
+                             .tilt_deg = 60,
+                             .plausible = true};
     assert_near(pass(w, 0).tilt.deg, 20, EXACT);
     assert_int_equal(w->state.tilt.belief.age_ns, 0);
 }
@@ -369,8 +370,9 @@ static void equal_times_divide_by_nothing(void **state)
     struct world *w = *state;
     for (int i = 0; i < 5; i++) {
         w->seen.spectrum_number++;
-        w->seen.spectrum = (struct spectrum_sample){
-            .taken = {w->now_ns, w->now_ns}, .status = SPECTROMETER_GOOD, .irradiance = w->lamps[A]};
+        w->seen.spectrum = (struct spectrum_sample){.taken = {w->now_ns, w->now_ns},
+                                                    .status = SPECTROMETER_GOOD,
+                                                    .irradiance = w->lamps[A]};
         w->seen.tilt_number++;
         w->seen.tilt = (struct tilt_sample){
             .taken = {w->now_ns, w->now_ns}, .tilt_deg = 20 + 0.01 * i, .plausible = true};

@@ -29,7 +29,7 @@
 #define assert_holds(text, part)                                                                   \
     do {                                                                                           \
         if (!strstr(text, part)) {                                                                 \
-            print_error("\"%s\" does not hold \"%s\"\n", text, part);                               \
+            print_error("\"%s\" does not hold \"%s\"\n", text, part);                              \
             _fail(__FILE__, __LINE__);                                                             \
         }                                                                                          \
     } while (0)

@@ -28,9 +28,8 @@ static inline void write_spectrum(const char *path, const struct spectrum *s)
 // sRGB primaries, white_cdm2 at full code, each channel code^2.2.
 static inline void write_display(const char *path, double white_cdm2)
 {
-    static const double primaries[3][3] = {{0.4124, 0.3576, 0.1805},
-                                           {0.2126, 0.7152, 0.0722},
-                                           {0.0193, 0.1192, 0.9505}};
+    static const double primaries[3][3] = {
+        {0.4124, 0.3576, 0.1805}, {0.2126, 0.7152, 0.0722}, {0.0193, 0.1192, 0.9505}};
     FILE *out = fopen(path, "w");
     fprintf(out, "[display]\nname = test panel\n[matrix]\n");
     for (int i = 0; i < 3; i++)

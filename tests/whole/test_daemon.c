@@ -16,8 +16,8 @@ enum { WIDTH = 160, HEIGHT = 100, CALL_MS = 60000 };
 static const double CEILING_CDM2 = 5000, CENTRE_Y = 0.75, CENTRE_Z = 0.05;
 static const double CEILING_W = 0.9, CEILING_D = 0.6, SCREEN_Y = 0.2, SCREEN_Z = 0.03;
 static const double REFLECTANCE = 0.002, WHITE_CDM2 = 900;
-static const double LIGHTS_ERROR = 0.002;  // 256 light points instead of an even ceiling
-static const double FLOAT_ERROR = 1e-4;    // relative: the GPU computes in float
+static const double LIGHTS_ERROR = 0.002; // 256 light points instead of an even ceiling
+static const double FLOAT_ERROR = 1e-4;   // relative: the GPU computes in float
 static const double HALF_A_CODE = 0.5 / 255;
 
 static struct folder here;
@@ -200,8 +200,8 @@ static void a_bare_daemon_says_what_is_missing_and_shows_patches(void **state)
     json_decref(status);
     static const double patches[][3] = {{1, 1, 1}, {0, 0, 0}, {1, 0.5, 0.2}, {0.003, 0.9, 0.25}};
     for (size_t i = 0; i < sizeof patches / sizeof *patches; i++) {
-        json_decref(ask(json_pack("{ss,s[fff]}", "do", "patch", "rgb", patches[i][0],
-                                  patches[i][1], patches[i][2])));
+        json_decref(ask(json_pack("{ss,s[fff]}", "do", "patch", "rgb", patches[i][0], patches[i][1],
+                                  patches[i][2])));
         uint8_t *pixels = capture_png();
         for (int p = 0; p < WIDTH * HEIGHT; p++)
             for (int c = 0; c < 3; c++)
@@ -374,12 +374,13 @@ static void white_on_the_screen_has_the_luminance_of_a_white_card(void **state)
     json_t *reply = ask(json_pack("{ss,ss}", "do", "show", "material", "white"));
     assert_string_equal(text(reply, "scene"), "surface");
     json_decref(reply);
-    json_t *probe = ask(json_pack("{ss,si,si}", "do", "probe", "x_px", WIDTH / 2, "y_px",
-                                  HEIGHT / 2));
+    json_t *probe =
+        ask(json_pack("{ss,si,si}", "do", "probe", "x_px", WIDTH / 2, "y_px", HEIGHT / 2));
     double lux = centre_lux(), pi = acos(-1);
     assert_near(real(probe, "lux"), lux, LIGHTS_ERROR * lux);
     assert_near(element(probe, "surface", 1), lux / pi, LIGHTS_ERROR * lux / pi);
-    assert_near(element(probe, "emitted", 1), (1 - REFLECTANCE) * lux / pi, LIGHTS_ERROR * lux / pi);
+    assert_near(element(probe, "emitted", 1), (1 - REFLECTANCE) * lux / pi,
+                LIGHTS_ERROR * lux / pi);
     struct exr light;
     const char *file = folder_at(&here, "shot.exr");
     json_decref(ask(json_pack("{ss,ss}", "do", "capture", "file", file)));
@@ -429,11 +430,11 @@ static void a_patch_of_the_chart_fills_the_screen_and_the_chart_does_not(void **
 {
     (void)state;
     begin(FLAT);
-    json_decref(ask(json_pack("{ss,ss,ss}", "do", "show", "material", "colorchecker24", "patch",
-                              "blue")));
+    json_decref(
+        ask(json_pack("{ss,ss,ss}", "do", "show", "material", "colorchecker24", "patch", "blue")));
     json_t *corner = ask(json_pack("{ss,si,si}", "do", "probe", "x_px", 0, "y_px", 0));
-    json_t *centre = ask(json_pack("{ss,si,si}", "do", "probe", "x_px", WIDTH / 2, "y_px",
-                                   HEIGHT / 2));
+    json_t *centre =
+        ask(json_pack("{ss,si,si}", "do", "probe", "x_px", WIDTH / 2, "y_px", HEIGHT / 2));
     for (int c = 0; c < 3; c++)
         assert_near(element(corner, "surface", c) / real(corner, "lux"),
                     element(centre, "surface", c) / real(centre, "lux"), 1e-9);
@@ -541,8 +542,14 @@ static void hang_up_signal_reloads(void **state)
 
 static int ctl(const char *command, const char *a, const char *b, const char *c)
 {
-    const char *argv[] = {program_path("boothctl"), "--socket", folder_at(&here, "boothd.sock"),
-                          command, a, b, c, NULL};
+    const char *argv[] = {program_path("boothctl"),
+                          "--socket",
+                          folder_at(&here, "boothd.sock"),
+                          command,
+                          a,
+                          b,
+                          c,
+                          NULL};
     return run_program(argv, folder_at(&here, "words"));
 }
 
@@ -592,7 +599,7 @@ static void boothctl_ends_with_2_on_wrong_usage_and_1_when_nobody_listens(void *
     };
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         const char *argv[] = {program_path("boothctl"), bad[i].words[0], bad[i].words[1],
-                              bad[i].words[2], bad[i].words[3], NULL};
+                              bad[i].words[2],          bad[i].words[3], NULL};
         assert_int_equal(run_program(argv, folder_at(&here, "words")), 2);
         assert_holds(words(), bad[i].part);
     }

@@ -123,9 +123,16 @@ static int open_booth(void **state)
     char run[256], config[256];
     snprintf(run, sizeof run, "%s", folder_at(&here, "run"));
     snprintf(config, sizeof config, "%s", folder_at(&here, "run/boothd.conf"));
-    const char *argv[] = {program_path("boothsim"), "--scenario",
-                          "simulator/scenarios/booth.ini", "--run", run, "--",
-                          program_path("boothd"), "--config", config, NULL};
+    const char *argv[] = {program_path("boothsim"),
+                          "--scenario",
+                          "simulator/scenarios/booth.ini",
+                          "--run",
+                          run,
+                          "--",
+                          program_path("boothd"),
+                          "--config",
+                          config,
+                          NULL};
     booth_pid = start_program(argv, folder_at(&here, "log"));
     daemon_client = connect_to(folder_at(&here, "run/boothd.sock"), booth_pid);
     booth_client = connect_to(folder_at(&here, "run/boothsim.sock"), booth_pid);
@@ -261,7 +268,8 @@ static void taught_lamps_are_recognised_when_they_are_switched(void **state)
 static double lux_off(void)
 {
     json_t *probe = ask(json_pack("{ss,si,si}", "do", "probe", "x_px", 640, "y_px", 400));
-    json_t *truth = call(booth_client, json_pack("{ss,si,si}", "do", "truth", "x_px", 640, "y_px", 400));
+    json_t *truth =
+        call(booth_client, json_pack("{ss,si,si}", "do", "truth", "x_px", 640, "y_px", 400));
     double off = real(probe, "lux") / real(truth, "lux") - 1;
     json_decref(probe);
     json_decref(truth);
@@ -336,7 +344,6 @@ static void an_unplugged_inclinometer_and_a_camera_come_back_too(void **state)
     json_decref(await_text("eye.standing", "fresh"));
 }
 
-
 static void others_are_served_while_the_radiometer_is_silent(void **state)
 {
     (void)state;
@@ -345,21 +352,21 @@ static void others_are_served_while_the_radiometer_is_silent(void **state)
     assert_non_null(patient);
     fault("radiometer", "silent");
     // Sent, and given up waiting at once: the reading goes on.
-    assert_null(control_call(patient, json_pack("{ss,sf}", "do", "measure", "timeout_s", 3.0), 1,
-                             &err));
+    assert_null(
+        control_call(patient, json_pack("{ss,sf}", "do", "measure", "timeout_s", 3.0), 1, &err));
     for (int i = 0; i < 20; i++)
         json_decref(ask(json_pack("{ss}", "do", "status")));
     json_decref(ask(json_pack("{ss,ss}", "do", "show", "material", "grey18")));
     control_close(patient);
-    json_t *reply = control_call(daemon_client, json_pack("{ss,sf}", "do", "measure", "timeout_s", 3.0),
-                                 CALL_MS, &err);
+    json_t *reply = control_call(
+        daemon_client, json_pack("{ss,sf}", "do", "measure", "timeout_s", 3.0), CALL_MS, &err);
     assert_null(reply);
     assert_int_equal(err.code, ERROR_RETRY);
     fault("radiometer", "fine");
     int64_t until_ns = clock_now_ns() + RUNNING_PATIENCE_S * NS_PER_S;
     while (!reply && clock_now_ns() < until_ns)
-        reply = control_call(daemon_client,
-                             json_pack("{ss,sf}", "do", "measure", "timeout_s", 30.0), CALL_MS, &err);
+        reply = control_call(
+            daemon_client, json_pack("{ss,sf}", "do", "measure", "timeout_s", 30.0), CALL_MS, &err);
     assert_non_null(reply);
     json_decref(reply);
 }
@@ -371,8 +378,8 @@ static void quitting_ends_daemon_and_booth_even_while_the_radiometer_is_awaited(
     struct control_client *patient = control_connect(folder_at(&here, "run/boothd.sock"), &err);
     assert_non_null(patient);
     fault("radiometer", "silent");
-    assert_null(control_call(patient, json_pack("{ss,sf}", "do", "measure", "timeout_s", 600.0), 1,
-                             &err));
+    assert_null(
+        control_call(patient, json_pack("{ss,sf}", "do", "measure", "timeout_s", 600.0), 1, &err));
     json_decref(ask(json_pack("{ss}", "do", "status"))); // behind it in the queue of requests
     json_decref(ask(json_pack("{ss}", "do", "quit")));
     control_close(patient);

@@ -39,8 +39,8 @@ static int install(void **state)
     setenv("XDG_RUNTIME_DIR", here.path, 1);
     snprintf(build, sizeof build, "BUILD=%s", given ? given : "build");
     snprintf(destination, sizeof destination, "DESTDIR=%s/root", here.path);
-    const char *argv[] = {"/usr/bin/make", "-s",        "--no-print-directory",
-                          build,           destination, "install-only", NULL};
+    const char *argv[] = {"/usr/bin/make", "-s", "--no-print-directory", build, destination,
+                          "install-only",  NULL};
     unsetenv("MAKEFLAGS");
     unsetenv("MAKELEVEL");
     int status = run(argv);
@@ -81,8 +81,8 @@ static const char *unit_here(void)
 static void the_unit_is_verified_without_a_word(void **state)
 {
     (void)state;
-    const char *argv[] = {"/usr/bin/systemd-analyze", "--user", "verify", "--man=no", unit_here(),
-                          NULL};
+    const char *argv[] = {
+        "/usr/bin/systemd-analyze", "--user", "verify", "--man=no", unit_here(), NULL};
     assert_int_equal(run(argv), 0);
     assert_string_equal(words, ""); // an unknown key is only a warning
 }
@@ -90,14 +90,8 @@ static void the_unit_is_verified_without_a_word(void **state)
 static void the_unit_is_hardened_as_far_as_instruments_and_mesa_allow(void **state)
 {
     (void)state;
-    const char *argv[] = {"/usr/bin/systemd-analyze",
-                          "--user",
-                          "security",
-                          "--offline=true",
-                          "--threshold=" EXPOSURE_MOST,
-                          "--no-pager",
-                          unit_here(),
-                          NULL};
+    const char *argv[] = {"/usr/bin/systemd-analyze",   "--user",     "security",  "--offline=true",
+                          "--threshold=" EXPOSURE_MOST, "--no-pager", unit_here(), NULL};
     int status = run(argv);
     if (status)
         print_error("%s\n", words);
@@ -185,8 +179,8 @@ static void uninstalling_leaves_nothing_behind(void **state)
     const char *given = getenv("BUILD");
     snprintf(build, sizeof build, "BUILD=%s", given ? given : "build");
     snprintf(destination, sizeof destination, "DESTDIR=%s/root", here.path);
-    const char *argv[] = {"/usr/bin/make", "-s",        "--no-print-directory",
-                          build,           destination, "uninstall", NULL};
+    const char *argv[] = {"/usr/bin/make", "-s", "--no-print-directory", build, destination,
+                          "uninstall",     NULL};
     assert_true(count_files(installed("")) > 15);
     assert_int_equal(run(argv), 0);
     assert_int_equal(count_files(installed("")), 0);
