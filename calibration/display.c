@@ -6,7 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/clock.h"
 #include "calibration/commands.h"
 #include "calibration/display_fit.h"
 #include "config/display_file.h"
@@ -200,28 +199,31 @@ static bool three_numbers(const char *line, double v[3], struct error *err)
     return !*at || fail(err, ERROR_DATA, "more than three numbers");
 }
 
-static bool one_forward(const struct display_model *model, const double v[3], struct error *err)
+static bool one_forward(const struct display_model *model, const double v[3], FILE *out,
+                        struct error *err)
 {
     for (int i = 0; i < 3; i++)
         if (v[i] < 0 || v[i] > 100)
             return fail(err, ERROR_RANGE, "RGB: %g is outside 0..100", v[i]);
     struct xyz c = display_forward(model, (struct counts){v[0] / 100, v[1] / 100, v[2] / 100});
-    printf("%.10g %.10g %.10g\n", c.X, c.Y, c.Z);
+    fprintf(out, "%.10g %.10g %.10g\n", c.X, c.Y, c.Z);
     return true;
 }
 
-static bool one_inverse(const struct display_model *model, const double v[3], struct error *err)
+static bool one_inverse(const struct display_model *model, const double v[3], FILE *out,
+                        struct error *err)
 {
     (void)err;
     struct display_inverse at = display_invert(model, (struct xyz){v[0], v[1], v[2]});
-    printf("%.10g %.10g %.10g%s\n", 100 * at.counts.r, 100 * at.counts.g, 100 * at.counts.b,
-           at.in_gamut ? "" : " out-of-gamut");
+    fprintf(out, "%.10g %.10g %.10g%s\n", 100 * at.counts.r, 100 * at.counts.g, 100 * at.counts.b,
+            at.in_gamut ? "" : " out-of-gamut");
     return true;
 }
 
-typedef bool one_line(const struct display_model *, const double v[3], struct error *);
+typedef bool one_line(const struct display_model *, const double v[3], FILE *, struct error *);
 
-static bool all_lines(const struct display_model *model, one_line *one, struct error *err)
+static bool all_lines(const struct display_model *model, one_line *one, FILE *out,
+                      struct error *err)
 {
     char *line = NULL;
     size_t room = 0;
@@ -230,11 +232,29 @@ static bool all_lines(const struct display_model *model, one_line *one, struct e
         double v[3];
         if (line[strspn(line, " \t\r\n")] == 0 || *line == '#')
             continue;
-        ok = (three_numbers(line, v, err) && one(model, v, err)) ||
+        ok = (three_numbers(line, v, err) && one(model, v, out, err)) ||
              while_doing(err, "stdin:%d", number);
-        fflush(stdout); // someone may wait at the other end of a pipe
     }
+    if (ok && ferror(stdin))
+        ok = fail_errno(err, "stdin");
     free(line);
+    return ok;
+}
+
+// Nothing is printed before the last line was understood.
+static bool print_lines(const struct display_model *model, one_line *one, struct error *err)
+{
+    char *text = NULL;
+    size_t size = 0;
+    FILE *out = open_memstream(&text, &size);
+    if (!out)
+        return fail_errno(err, "no memory for the answer");
+    bool ok = all_lines(model, one, out, err);
+    if (fclose(out) && ok)
+        ok = fail_errno(err, "no memory for the answer");
+    if (ok)
+        fwrite(text, 1, size, stdout);
+    free(text);
     return ok;
 }
 
@@ -248,7 +268,7 @@ static int run_lines(int argc, char **argv, one_line *one)
         fail(&err, ERROR_SYSTEM, "out of memory");
         return command_failed(&err);
     }
-    bool ok = display_load(argv[1], model, NULL, &err) && all_lines(model, one, &err);
+    bool ok = display_load(argv[1], model, NULL, &err) && print_lines(model, one, &err);
     free(model);
     return ok ? COMMAND_FINE : command_bad_input(&err);
 }

@@ -374,6 +374,11 @@ static void forward_and_inverse_undo_each_other_line_by_line(void **state)
     assert_non_null(strstr(back, " out-of-gamut\n"));
     assert_int_equal(lines("forward", "50 101 50\n", out, sizeof out), COMMAND_USAGE);
     assert_int_equal(lines("inverse", "1 2\n", out, sizeof out), COMMAND_USAGE);
+    // A bad line leaves nothing of the good ones before it.
+    assert_int_equal(lines("forward", "50 25 75\n50 25\n", out, sizeof out), COMMAND_USAGE);
+    assert_string_equal(out, "");
+    assert_int_equal(lines("inverse", "20 20 20\n1 2 x\n", out, sizeof out), COMMAND_USAGE);
+    assert_string_equal(out, "");
 }
 
 int main(void)
