@@ -11,7 +11,7 @@
 #include "files/text.h"
 #include "files/write.h"
 
-enum { SIDE_MOST = 16384, ATTRIBUTES_MOST = 16, NAME_MOST = 31 };
+enum { SIDE_MOST = 16384, NAME_MOST = 31 };
 
 // One image fills memory before it fills the range of its sides.
 static const size_t BYTES_MOST = (size_t)4 << 30;
@@ -70,7 +70,7 @@ int exr_channel(const struct exr *image, const char *name)
 
 bool exr_number(const struct exr *image, const char *name, double *value)
 {
-    for (int i = 0; i < ATTRIBUTES_MOST && *image->numbers[i].name; i++) {
+    for (int i = 0; i < EXR_ATTRIBUTES_MOST && *image->numbers[i].name; i++) {
         if (strcmp(image->numbers[i].name, name))
             continue;
         *value = image->numbers[i].value;
@@ -79,26 +79,30 @@ bool exr_number(const struct exr *image, const char *name, double *value)
     return false;
 }
 
-void exr_set_number(struct exr *image, const char *name, double value)
+bool exr_set_number(struct exr *image, const char *name, double value)
 {
     int i = 0;
-    while (i < ATTRIBUTES_MOST && *image->numbers[i].name && strcmp(image->numbers[i].name, name))
+    while (i < EXR_ATTRIBUTES_MOST && *image->numbers[i].name &&
+           strcmp(image->numbers[i].name, name))
         i++;
-    if (i == ATTRIBUTES_MOST)
-        return;
-    snprintf(image->numbers[i].name, sizeof image->numbers[i].name, "%s", name);
+    if (i == EXR_ATTRIBUTES_MOST || strlen(name) >= sizeof image->numbers[i].name)
+        return false;
+    strcpy(image->numbers[i].name, name);
     image->numbers[i].value = value;
+    return true;
 }
 
-void exr_set_text(struct exr *image, const char *name, const char *value)
+bool exr_set_text(struct exr *image, const char *name, const char *value)
 {
     int i = 0;
-    while (i < ATTRIBUTES_MOST && *image->texts[i].name && strcmp(image->texts[i].name, name))
+    while (i < EXR_ATTRIBUTES_MOST && *image->texts[i].name && strcmp(image->texts[i].name, name))
         i++;
-    if (i == ATTRIBUTES_MOST)
-        return;
-    snprintf(image->texts[i].name, sizeof image->texts[i].name, "%s", name);
-    snprintf(image->texts[i].value, sizeof image->texts[i].value, "%s", value);
+    if (i == EXR_ATTRIBUTES_MOST || strlen(name) >= sizeof image->texts[i].name ||
+        strlen(value) >= sizeof image->texts[i].value)
+        return false;
+    strcpy(image->texts[i].name, name);
+    strcpy(image->texts[i].value, value);
+    return true;
 }
 
 static void complain(exr_const_context_t context, exr_result_t code, const char *message)
@@ -263,7 +267,7 @@ static void take_attributes(exr_context_t context, struct exr *image)
         if (exr_get_attribute_by_index(context, 0, EXR_ATTR_LIST_FILE_ORDER, i, &a))
             continue;
         bool structural = !strcmp(a->name, "name") || !strcmp(a->name, "type");
-        if (structural || strlen(a->name) >= sizeof image->numbers[0].name)
+        if (structural)
             continue;
         if (a->type == EXR_ATTR_DOUBLE)
             exr_set_number(image, a->name, a->d);
@@ -410,10 +414,10 @@ static bool describe(exr_context_t context, const struct exr *image)
         if (exr_add_channel(context, part, image->names[c], EXR_PIXEL_FLOAT,
                             EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1))
             return false;
-    for (int i = 0; i < ATTRIBUTES_MOST && *image->numbers[i].name; i++)
+    for (int i = 0; i < EXR_ATTRIBUTES_MOST && *image->numbers[i].name; i++)
         if (exr_attr_set_double(context, part, image->numbers[i].name, image->numbers[i].value))
             return false;
-    for (int i = 0; i < ATTRIBUTES_MOST && *image->texts[i].name; i++)
+    for (int i = 0; i < EXR_ATTRIBUTES_MOST && *image->texts[i].name; i++)
         if (exr_attr_set_string(context, part, image->texts[i].name, image->texts[i].value))
             return false;
     return !exr_write_header(context);

@@ -9,6 +9,7 @@
 #include "base/error.h"
 
 #define EXR_CHANNELS_MOST 64
+#define EXR_ATTRIBUTES_MOST 64 // of a kind
 
 // Planar floats: plane c starts at pixels + c * width * height; row 0 is the
 // top. Owned by the caller of exr_load; free with exr_fini.
@@ -21,10 +22,10 @@ struct exr {
     struct exr_number {
         char name[64];
         double value;
-    } numbers[16]; // double attributes such as "boothd.width_m"
+    } numbers[EXR_ATTRIBUTES_MOST]; // double attributes such as "boothd.width_m"
     struct exr_text {
         char name[64], value[256];
-    } texts[16]; // string attributes such as "boothd.lamp"
+    } texts[EXR_ATTRIBUTES_MOST]; // string attributes such as "boothd.lamp"
 };
 
 void exr_fini(struct exr *image);
@@ -34,7 +35,8 @@ bool exr_init(struct exr *image, int width, int height, int channels, struct err
 
 // Reads a file. Lossy compressions (DWA, B44, PXR24) are refused, since a light
 // map must be exact; so are tiled, deep and multi-part files and images whose
-// pixels are not finite (error DATA gives channel, x, y).
+// pixels are not finite (error DATA gives channel, x, y). Attributes that there
+// is no room for are left out.
 bool exr_load(const char *path, struct exr *image, struct error *err);
 
 // Writes float channels, ZIP, by write-fsync-rename.
@@ -46,8 +48,9 @@ int exr_channel(const struct exr *image, const char *name);
 // A double attribute; false when there is none of that name.
 bool exr_number(const struct exr *image, const char *name, double *value);
 
-// Adds a double or a text attribute; silently full after 16 of a kind.
-void exr_set_number(struct exr *image, const char *name, double value);
-void exr_set_text(struct exr *image, const char *name, const char *value);
+// Sets a double or a text attribute. False when there is no room for it:
+// EXR_ATTRIBUTES_MOST others of its kind, or a name or a text that is too long.
+bool exr_set_number(struct exr *image, const char *name, double value);
+bool exr_set_text(struct exr *image, const char *name, const char *value);
 
 #endif

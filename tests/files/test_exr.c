@@ -114,7 +114,7 @@ static void an_image_of_one_value_packs_tightly_and_still_loads(void **state)
     exr_fini(&back);
 }
 
-static void a_seventeenth_attribute_is_left_out(void **state)
+static void attributes_beyond_the_room_are_refused_and_the_others_come_back(void **state)
 {
     (void)state;
     static const char *const NAMES[] = {"Y", NULL};
@@ -122,18 +122,35 @@ static void a_seventeenth_attribute_is_left_out(void **state)
     double value = 0;
     char name[16];
     fill(&image, 2, 2, NAMES);
-    for (int i = 0; i < 17; i++) {
+    for (int i = 0; i <= EXR_ATTRIBUTES_MOST; i++) {
         snprintf(name, sizeof name, "n%02d", i);
-        exr_set_number(&image, name, i);
-        exr_set_text(&image, name + 1, name);
+        assert_int_equal(exr_set_number(&image, name, i), i < EXR_ATTRIBUTES_MOST);
+        assert_int_equal(exr_set_text(&image, name + 1, name), i < EXR_ATTRIBUTES_MOST);
     }
+    assert_true(exr_set_number(&image, "n00", -1)); // not a new one
     assert_true(exr_save(at("a.exr"), &image, NULL));
     assert_true(exr_load(at("a.exr"), &back, NULL));
-    assert_true(exr_number(&back, "n15", &value) && value == 15);
-    assert_false(exr_number(&back, "n16", &value));
-    assert_string_equal(back.texts[15].value, "n15");
+    assert_true(exr_number(&back, "n00", &value) && value == -1);
+    assert_true(exr_number(&back, "n63", &value) && value == 63);
+    assert_false(exr_number(&back, "n64", &value));
+    assert_string_equal(back.texts[63].value, "n63");
     exr_fini(&image);
     exr_fini(&back);
+}
+
+static void attributes_that_are_too_long_are_refused(void **state)
+{
+    (void)state;
+    struct exr image = {0};
+    char text[257];
+    memset(text, 'x', sizeof text);
+    text[256] = 0;
+    assert_false(exr_set_text(&image, "a", text));
+    assert_true(exr_set_text(&image, "a", text + 1));
+    assert_false(exr_set_text(&image, text + 256 - 64, "v"));
+    assert_false(exr_set_number(&image, text + 256 - 64, 1));
+    assert_true(exr_set_number(&image, text + 256 - 63, 1));
+    assert_string_equal(image.texts[1].name, "");
 }
 
 static void sizes_out_of_range_are_refused(void **state)
@@ -444,7 +461,8 @@ int main(void)
         cmocka_unit_test(an_image_comes_back_to_the_last_bit_with_its_attributes),
         cmocka_unit_test(every_size_around_a_block_comes_back),
         cmocka_unit_test(an_image_of_one_value_packs_tightly_and_still_loads),
-        cmocka_unit_test(a_seventeenth_attribute_is_left_out),
+        cmocka_unit_test(attributes_beyond_the_room_are_refused_and_the_others_come_back),
+        cmocka_unit_test(attributes_that_are_too_long_are_refused),
         cmocka_unit_test(sizes_out_of_range_are_refused),
         cmocka_unit_test(what_would_not_load_is_not_saved),
         cmocka_unit_test(every_lossless_compression_is_read_exactly),

@@ -281,6 +281,35 @@ static void an_image_may_bring_its_own_band_set_but_not_half_of_one(void **state
     exr_fini(&image);
 }
 
+static void an_image_of_the_most_bands_brings_all_its_shapes(void **state)
+{
+    (void)state;
+    struct band_set set;
+    struct error err = {0};
+    struct material m;
+    double centre[BANDS_MOST], width[BANDS_MOST];
+    for (int j = 0; j < BANDS_MOST; j++) {
+        centre[j] = 400 + 20 * j;
+        width[j] = 15 + 0.25 * j;
+    }
+    assert_good(band_set_make(BANDS_MOST, centre, width, &set, &err), err);
+    struct exr image = band_image(&set);
+    for (int j = 0; j < BANDS_MOST; j++) {
+        char name[64];
+        snprintf(name, sizeof name, "boothd.centre_nm%d", j);
+        assert_true(exr_set_number(&image, name, centre[j]));
+        snprintf(name, sizeof name, "boothd.width_nm%d", j);
+        assert_true(exr_set_number(&image, name, width[j]));
+    }
+    save(&image);
+    exr_fini(&image);
+    assert_good(material_from_exr("image", path, &m, &err), err);
+    assert_int_equal(m.bands.count, BANDS_MOST);
+    assert_memory_equal(m.bands.centre_nm, centre, sizeof centre);
+    assert_memory_equal(m.bands.width_nm, width, sizeof width);
+    material_fini(&m);
+}
+
 static void an_image_without_bands_or_without_file_is_refused_by_name(void **state)
 {
     (void)state;
@@ -311,6 +340,7 @@ int main(void)
         cmocka_unit_test(a_dark_lamp_and_unknown_band_counts_are_refused),
         cmocka_unit_test(bands_from_an_image_bake_like_the_surfaces_they_stand_for),
         cmocka_unit_test(an_image_may_bring_its_own_band_set_but_not_half_of_one),
+        cmocka_unit_test(an_image_of_the_most_bands_brings_all_its_shapes),
         cmocka_unit_test(an_image_without_bands_or_without_file_is_refused_by_name),
     };
     return cmocka_run_group_tests(tests, make_palette, remove_file);
