@@ -38,13 +38,15 @@ if [ "$1" = --inside ]; then
         sleep 0.2
     done
     for lamp in $lamps; do set -- "$@" --lamp "$lamp=$(spectrum_of $lamp)"; done
+    status=0
     "$programs/boothcal" session --config "$run/boothd.conf" --socket "$run/boothd.sock" \
-        --booth "$run/boothsim.sock" --maps "$run" --out "$out" "$@"
+        --booth "$run/boothsim.sock" --maps "$run" --out "$out" "$@" || status=$?
+    [ $status = 0 ] || [ $status = 3 ] || exit $status
     "$programs/boothctl" --socket "$run/boothd.sock" quit >/dev/null
     wait "$daemon"
     daemon=
     cp "$run/display.ini" "$out/display.ini"
-    exit 0
+    exit $status
 fi
 
 mkdir -p "$1"

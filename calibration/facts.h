@@ -10,7 +10,7 @@
 #include "calibration/statistics.h"
 #include "colorimetry/colour.h"
 
-enum { FACTS_PATCHES = 64, FACTS_LAMPS = 8, FACTS_POSES = 32 };
+enum { FACTS_PATCHES = 64, FACTS_LAMPS = 8, FACTS_POSES = 32, FACTS_SPOTS = 7 };
 
 // One patch under one lamp. Tristimulus values are absolute, cd/m2, 1931 2
 // degrees, unless a name says otherwise.
@@ -27,7 +27,7 @@ struct patch_report {
     double de_absolute;   // measured against reference, cd/m2, no division
 };
 
-// The four summaries that stand beside the published table.
+// The summaries that stand beside the published table.
 struct proof_summary {
     struct summary simulation, published, published_in_gamut, absolute, absolute_in_gamut;
 };
@@ -39,14 +39,17 @@ struct lamp_report {
     int teach_readings;
     struct xy chromaticity;
     struct cct cct;
-    double map_scale; // spot reading over map reading
+    double map_scale; // median of the spot readings over what the map says there
     int spots;
+    double spot_ratios[FACTS_SPOTS];
+    struct xyz white_taught;                    // perfect diffuser under the taught spectrum, Y = 100
     struct xyz white_reference, white_measured; // perfect diffuser at the screen's centre, cd/m2
     double white_error_percent;                 // of luminance
     int patch_count;
     struct patch_report patches[FACTS_PATCHES];
     int white_patch; // index of the patch that the published method divides by
     struct proof_summary proof;
+    bool reached;      // every target of proof.h
     char picture[512]; // PNG of what the screen showed
 };
 
@@ -76,7 +79,7 @@ struct session_facts {
     struct lamp_report lamps[FACTS_LAMPS];
     struct display_report display;
     struct pose_report poses[FACTS_POSES];
-    json_t *settings; // of the daemon: its status at the start
+    json_t *settings; // of the daemon: its whole status at the end
     json_t *readings; // array: every reply of the radiometer and every taught spectrum, as it came
     double seconds;
 };

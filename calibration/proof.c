@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration/proof.h"
 
+#include <math.h>
+
 static const double WHITE_PATCH_FACTOR = 1.13;
 static const struct xyz D65_WHITE = {0.95047, 1, 1.08883};
 
@@ -31,9 +33,10 @@ static bool judge_patch(struct lamp_report *lamp, struct patch_report *p, struct
 {
     const struct patch_report *w = &lamp->patches[lamp->white_patch];
     struct xyz white = divided(lamp->white_reference, lamp->white_reference.Y);
+    struct xyz taught = divided(lamp->white_taught, lamp->white_taught.Y);
     struct lab reference, measured;
     if (!proof_published_difference(divided(p->full, WHITE_PATCH_FACTOR * w->full.Y),
-                                    divided(p->bands, WHITE_PATCH_FACTOR * w->bands.Y), white,
+                                    divided(p->bands, WHITE_PATCH_FACTOR * w->bands.Y), taught,
                                     &p->de_simulation, err) ||
         !proof_published_difference(divided(p->reference, WHITE_PATCH_FACTOR * w->reference.Y),
                                     divided(p->measured, WHITE_PATCH_FACTOR * w->measured.Y), white,
@@ -49,7 +52,7 @@ bool proof_judge(struct lamp_report *lamp, struct error *err)
 {
     const struct patch_report *w = &lamp->patches[lamp->white_patch];
     if (!(w->measured.Y > 0 && w->reference.Y > 0 && w->full.Y > 0 && w->bands.Y > 0 &&
-          lamp->white_reference.Y > 0))
+          lamp->white_reference.Y > 0 && lamp->white_taught.Y > 0))
         return fail(err, ERROR_DATA, "lamp %s: a white whose luminance is not positive", lamp->name);
     double all[3][FACTS_PATCHES], inside[2][FACTS_PATCHES];
     int inside_count = 0;
@@ -73,5 +76,9 @@ bool proof_judge(struct lamp_report *lamp, struct error *err)
         .absolute_in_gamut = summarise(inside[1], inside_count),
     };
     lamp->white_error_percent = 100 * (lamp->white_measured.Y / lamp->white_reference.Y - 1);
+    lamp->reached = lamp->proof.published_in_gamut.n > 0 &&
+                    lamp->proof.published_in_gamut.mean <= PROOF_MEAN_MOST &&
+                    lamp->proof.published_in_gamut.max <= PROOF_MAX_MOST &&
+                    fabs(lamp->white_error_percent) <= PROOF_WHITE_PERCENT_MOST;
     return true;
 }

@@ -5,6 +5,12 @@
 
 #include "calibration/facts.h"
 
+// What a proof must reach: dE00 from the screen, in gamut, as published, and
+// the luminance of white in per cent.
+#define PROOF_MEAN_MOST 0.6
+#define PROOF_MAX_MOST 1.8
+#define PROOF_WHITE_PERCENT_MOST 1.0
+
 // Fills de_* of every patch and lamp->proof. Needs reference, measured, full,
 // bands and in_gamut of every patch, white_reference and white_patch.
 //
@@ -13,7 +19,8 @@
 // perfect diffuser to D65, CIELAB under D65, CIEDE2000.
 // Absolute: cd/m2, no division, no adaptation; the white of CIELAB is the
 // perfect diffuser at that place under that lamp.
-// Errors (DATA): a white that is not positive.
+// lamp->reached tells whether all targets above are met.
+// Errors (DATA, RANGE): a white that is not positive.
 bool proof_judge(struct lamp_report *lamp, struct error *err);
 
 // One colour difference as published: both colours are already divided, Y = 1

@@ -26,6 +26,14 @@ static const char HEAD[] =
     "@media print{body{margin:0;max-width:none}pre{max-height:none;white-space:pre-wrap}h2{break-after:avoid}"
     "table,svg,img{break-inside:avoid}}</style></head><body>\n";
 
+static const char *spectral_mode(const struct session_facts *f)
+{
+    const json_t *quality =
+        json_object_get(json_object_get(f->settings, "settings"), "quality");
+    const char *mode = json_string_value(json_object_get(quality, "spectral"));
+    return mode ? mode : "unknown";
+}
+
 static void heading(FILE *out, const struct session_facts *f)
 {
     fprintf(out, "<h1>Accuracy of the soft proof: ");
@@ -41,6 +49,11 @@ static void heading(FILE *out, const struct session_facts *f)
                   "1 nm over the whole ceiling"
                 : "full reflectance spectra under the taught spectrum of the lamp, at the illuminance "
                   "that follows from its luminance map");
+    fprintf(out, "<p>Every patch was shown and measured at the centre of the screen, along its normal: "
+                 "off-axis fall-off and uniformity of the panel are not part of these figures. Band simulation: "
+                 "band coefficients against full spectra under the taught lamp. From screen: shown with "
+                 "<code>spectral = %s</code>%s.</p>\n",
+            spectral_mode(f), strcmp(spectral_mode(f), "auto") ? "" : ", that is full spectra baked per lamp where they are known");
 }
 
 static void summary_row(FILE *out, const char *what, const struct summary *s)
@@ -73,7 +86,11 @@ static void lamp_summary(FILE *out, const struct lamp_report *l)
         published_row(out, "published: from screen, all", published_table[i].screen);
         published_row(out, "published: from screen, in gamut", published_table[i].in_gamut);
     }
-    fprintf(out, "</table>\n");
+    fprintf(out,
+            "</table>\n<p>Targets, from screen, in gamut, as published: mean %.1f, max %.1f; luminance of "
+            "white within %.0f %%: <b%s</b>.</p>\n",
+            PROOF_MEAN_MOST, PROOF_MAX_MOST, PROOF_WHITE_PERCENT_MOST,
+            l->reached ? ">reached" : " class=\"bad\">missed");
 }
 
 static void lamp_bars(FILE *out, const struct lamp_report *l)

@@ -41,6 +41,12 @@ static json_t *json_lamp(const struct lamp_report *l)
         json_summary(&l->proof.published_in_gamut), "absolute", json_summary(&l->proof.absolute),
         "absolute_in_gamut", json_summary(&l->proof.absolute_in_gamut), "picture", l->picture,
         "patches", patches, "irradiance_360_830_W_m2_nm", irradiance);
+    json_t *ratios = json_array();
+    for (int i = 0; i < l->spots; i++)
+        json_array_append_new(ratios, json_real(l->spot_ratios[i]));
+    json_object_set_new(out, "spot_ratios", ratios);
+    json_object_set_new(out, "reached", json_boolean(l->reached));
+    json_object_set_new(out, "white_taught_relative", json_xyz(l->white_taught));
     json_object_set_new(out, "cct_K", l->cct.valid ? json_real(l->cct.kelvin) : json_null());
     json_object_set_new(out, "duv", l->cct.valid ? json_real(l->cct.duv) : json_null());
     return out;
@@ -91,12 +97,13 @@ json_t *report_as_json(const struct session_facts *f)
     for (int i = 0; i < f->pose_count; i++)
         json_array_append_new(poses, json_pose(&f->poses[i]));
     return json_pack(
-        "{ss,ss,ss,ss,ss,sb,ss,sf,so,so,so,so,sO,sO}", "booth", f->booth, "started", f->started,
+        "{ss,ss,ss,ss,ss,sb,ss,sf,so,so,so,so,sO,sO,s{sf,sf,sf}}", "booth", f->booth, "started", f->started,
         "finished", f->finished, "software", f->software, "observer", f->observer, "emulated",
         f->emulated, "reference",
         f->truth_emulated ? "physical sample in the emulated booth, 1 nm integration"
                           : "taught spectrum and luminance map, 1 nm integration",
         "seconds", f->seconds, "display", json_display(&f->display), "lamps", lamps, "poses", poses,
         "published_mean_std_p90_max", json_published(), "settings", f->settings, "readings",
-        f->readings);
+        f->readings, "targets", "de00_mean", PROOF_MEAN_MOST, "de00_max", PROOF_MAX_MOST,
+        "white_percent", PROOF_WHITE_PERCENT_MOST);
 }

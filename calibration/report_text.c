@@ -41,6 +41,9 @@ static void lamp_table(FILE *out, const struct lamp_report *l)
     row(out, "from screen, absolute, in gamut", &l->proof.absolute_in_gamut);
     row(out, "from screen, absolute, all", &l->proof.absolute);
     published(out, l->name);
+    fprintf(out, "  targets (in gamut, as published: mean %.1f, max %.1f; white %.0f %%): %s\n",
+            PROOF_MEAN_MOST, PROOF_MAX_MOST, PROOF_WHITE_PERCENT_MOST,
+            l->reached ? "reached" : "MISSED");
 }
 
 void report_as_text(const struct session_facts *f, FILE *out)

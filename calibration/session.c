@@ -12,6 +12,7 @@
 #include "base/clock.h"
 #include "calibration/commands.h"
 #include "calibration/report.h"
+#include "config/paths.h"
 
 static const char USAGE[] =
     "usage: boothcal session --config FILE --maps FOLDER -o FOLDER [options]\n"
@@ -21,7 +22,7 @@ static const char USAGE[] =
     "tilts the screen and moves the head. Without --booth it asks you to turn the knobs.\n"
     "\n"
     "  --config FILE        boothd's settings\n"
-    "  --socket PATH        boothd's control socket (default: the settings')\n"
+    "  --socket PATH        boothd's control socket (default: the settings', else the user's)\n"
     "  --booth PATH         control socket of an emulated booth\n"
     "  --maps FOLDER        luminance maps ceiling-LAMP.exr (cd/m2, channel Y)\n"
     "  --lamp NAME[=TEXT]   a lamp of the booth, in order; TEXT is noted in the report\n"
@@ -29,7 +30,10 @@ static const char USAGE[] =
     "  --material NAME      chart to proof (default: colorchecker24)\n"
     "  --rehearse           few patches: shows that the chain works, proves nothing\n"
     "  -o, --out FOLDER     where report.html, report.json, display.ti3 and pictures go\n"
-    "  --help\n";
+    "  --help\n"
+    "\n"
+    "Ends with 0; 1 when it failed; 2 on wrong usage or input; 3 when it is done, but\n"
+    "not every target was reached.\n";
 
 struct options {
     const char *config, *socket, *booth, *maps, *out, *material;
@@ -90,23 +94,47 @@ static void take_lamps(const struct options *o, struct session_facts *f)
     }
 }
 
+// What would otherwise be missed only after an hour of readings.
+static bool check_paths(struct session *s, const struct options *o, struct error *err)
+{
+    if (mkdir(o->out, 0777) && errno != EEXIST)
+        return fail_errno(err, "%s", o->out);
+    if (!path_absolute(o->out, s->out, sizeof s->out, err) ||
+        !path_absolute(o->maps, s->maps, sizeof s->maps, err))
+        return false;
+    if (access(s->out, W_OK))
+        return fail_errno(err, "%s", s->out);
+    if (!*s->settings.display.model)
+        return fail(err, ERROR_CONFIG, "%s: [display] model: names no file to fit into", o->config);
+    for (int i = 0; i < s->facts->lamp_count; i++) {
+        char map[512];
+        session_map(s, i, map, sizeof map);
+        if (access(map, R_OK))
+            return fail(err, ERROR_CONFIG, "%s: cannot be read: the luminance map of lamp %s", map,
+                        s->facts->lamps[i].name);
+    }
+    return true;
+}
+
 static bool begin(struct session *s, const struct options *o, struct error *err)
 {
     struct session_facts *f = s->facts;
-    const char *socket = o->socket ? o->socket : s->settings.control.socket;
-    if (mkdir(o->out, 0777) && errno != EEXIST)
-        return fail_errno(err, "%s", o->out);
+    char socket[128];
+    snprintf(socket, sizeof socket, "%s", o->socket ? o->socket : s->settings.control.socket);
+    take_lamps(o, f);
+    if (!check_paths(s, o, err) ||
+        (!*socket && !booth_socket_default(getenv("XDG_RUNTIME_DIR"), socket, sizeof socket, err)))
+        return false;
     if (!(s->bench.daemon = control_connect(socket, err)) ||
         (o->booth && !(s->bench.booth = control_connect(o->booth, err))))
         return false;
-    take_lamps(o, f);
     s->bench.terminal = isatty(STDERR_FILENO);
     s->bench.readings = f->readings = json_array();
     snprintf(f->booth, sizeof f->booth, "%s", s->settings.booth.name);
     snprintf(f->software, sizeof f->software, "boothd %s", BOOTHD_VERSION);
     snprintf(f->observer, sizeof f->observer, "%s",
              observer_name((enum observer)s->settings.quality.observer));
-    f->emulated = f->truth_emulated = s->bench.booth;
+    f->truth_emulated = s->bench.booth;
     clock_utc(f->started);
     return true;
 }
@@ -139,11 +167,32 @@ static bool steps(struct session *s, struct error *err)
     return session_poses(s, err) && (f->settings = bench_status(&s->bench, err));
 }
 
+// Emulated as soon as anything says so: the booth's settings, an instrument,
+// whoever answers for the reference.
+static bool emulated(const struct session_facts *f)
+{
+    size_t i;
+    json_t *reading;
+    bool any = f->truth_emulated || json_is_true(json_object_get(f->settings, "emulated"));
+    json_array_foreach(f->readings, i, reading)
+        any = any || json_is_true(json_object_get(reading, "emulated"));
+    return any;
+}
+
+static bool reached(const struct session_facts *f)
+{
+    bool all = true;
+    for (int i = 0; i < f->lamp_count; i++)
+        all = all && f->lamps[i].reached;
+    return all;
+}
+
 static bool run(struct session *s, const struct options *o, struct error *err)
 {
     int64_t began = clock_now_ns();
     if (!booth_load(o->config, NULL, 0, &s->settings, err) || !begin(s, o, err) || !steps(s, err))
         return false;
+    s->facts->emulated = emulated(s->facts);
     clock_utc(s->facts->finished);
     s->facts->seconds = (double)(clock_now_ns() - began) / 1e9;
     if (!report_save(s->facts, s->out, err))
@@ -162,11 +211,12 @@ int command_session(int argc, char **argv)
     struct session_facts *facts = calloc(1, sizeof *facts);
     struct session *s = calloc(1, sizeof *s);
     struct error err = {0};
-    bool fine = false;
+    bool fine = false, all_reached = false;
     if (facts && s) {
-        *s = (struct session){.facts = facts, .out = o.out, .maps = o.maps, .material = o.material,
+        *s = (struct session){.facts = facts, .material = o.material,
                               .rehearse = o.rehearse};
         fine = run(s, &o, &err);
+        all_reached = reached(facts);
         control_close(s->bench.daemon);
         control_close(s->bench.booth);
         json_decref(facts->settings);
@@ -176,5 +226,7 @@ int command_session(int argc, char **argv)
         fprintf(stderr, "boothcal session: %s\n", err.text);
     free(s);
     free(facts);
-    return fine ? COMMAND_FINE : err.code == ERROR_CONFIG ? COMMAND_USAGE : COMMAND_FAILED;
+    if (fine)
+        return all_reached ? COMMAND_FINE : COMMAND_WARNED;
+    return err.code == ERROR_CONFIG ? COMMAND_USAGE : COMMAND_FAILED;
 }

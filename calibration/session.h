@@ -12,14 +12,17 @@ struct session {
     struct bench bench;
     struct booth_settings settings; // boothd's own
     struct session_facts *facts;
-    const char *out;       // folder of the results
-    const char *maps;      // folder of luminance maps "ceiling-<lamp>.exr"
+    char out[400];         // folder of the results, absolute
+    char maps[400];        // folder of luminance maps "ceiling-<lamp>.exr", absolute
     const char *material;  // chart to proof
     bool rehearse;         // few patches only: shows that the chain works
 };
 
+// Path of the luminance map of lamp i.
+void session_map(const struct session *s, int lamp, char *path, size_t size);
+
 // Teaches lamp i from live readings, scales its luminance map by spot readings
-// and writes it into boothd's lamp folder.
+// and writes what was taught (not the map itself) into boothd's lamp folder.
 bool session_teach(struct session *s, int lamp, struct error *err);
 
 // In the dark booth: measures ramps, greys and random patches in random order

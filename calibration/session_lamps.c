@@ -8,11 +8,12 @@
 #include "calibration/session.h"
 #include "config/lamps.h"
 
-enum { TEACH_READINGS = 10, PROBE_READINGS = 2, SPOTS = 5, GRID = 24, CANDIDATES = 2 * GRID * GRID };
+enum { TEACH_READINGS = 10, PROBE_READINGS = 2, GRID = 24, CANDIDATES = 2 * GRID * GRID };
 static const double STEADY = 0.005;    // relative change of illuminance between two short readings
 static const double SPOT_M = 0.010;    // what the radiometer sees of the ceiling
-static const double AROUND_M = 0.024;  // what must be alike around it
-static const double ALIKE = 0.03;
+static const double BESIDE_M = 0.005; // twice what aiming may be off
+static const double ALIKE = 0.02;     // four times the noise of a map's spot mean
+static const double AGREE = 0.02;     // spots that scale the map more differently contradict each other
 static const double APART_M = 0.02;   // spots apart, so that they are of different pixels
 static const double STEP_DOWN = 0.6;  // of a luminance that overloaded the radiometer
 
@@ -40,20 +41,33 @@ static int brighter_first(const void *a, const void *b)
     return (x < y) - (x > y);
 }
 
-// Places whose surroundings are alike, so that aiming a little beside them
-// does no harm; the brightest first. Returns how many.
+// Largest relative difference between a place and its four neighbours: the
+// middle of a slope is as bright as its surroundings, but not even.
+static double unevenness(const struct luminance_map *map, const struct spot *p)
+{
+    static const int SIDES[4][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}};
+    double most = 0;
+    for (int i = 0; i < 4; i++) {
+        double side = luminance_map_spot(map, p->x_m + SIDES[i][0] * BESIDE_M,
+                                         p->z_m + SIDES[i][1] * BESIDE_M, SPOT_M);
+        most = fmax(most, fabs(side / p->map_cdm2 - 1));
+    }
+    return most;
+}
+
+// Even places, so that aiming a little beside them does no harm; the brightest
+// first. Returns how many.
 static int even_places(const struct luminance_map *map, struct spot places[CANDIDATES])
 {
     const struct ceiling *c = &map->ceiling;
     int n = 0;
     for (int j = 0; j < GRID; j++) {
         for (int i = 0; i < 2 * GRID; i++) {
-            double x = c->centre_m[0] + c->width_m * ((i + 0.5) / (2 * GRID) - 0.5);
-            double z = c->centre_m[2] + c->depth_m * ((j + 0.5) / GRID - 0.5);
-            double here = luminance_map_spot(map, x, z, SPOT_M);
-            double around = luminance_map_spot(map, x, z, AROUND_M);
-            if (here > 0 && fabs(around / here - 1) < ALIKE)
-                places[n++] = (struct spot){x, z, here};
+            struct spot p = {.x_m = c->centre_m[0] + c->width_m * ((i + 0.5) / (2 * GRID) - 0.5),
+                             .z_m = c->centre_m[2] + c->depth_m * ((j + 0.5) / GRID - 0.5)};
+            p.map_cdm2 = luminance_map_spot(map, p.x_m, p.z_m, SPOT_M);
+            if (p.map_cdm2 > 0 && unevenness(map, &p) < ALIKE)
+                places[n++] = p;
         }
     }
     qsort(places, (size_t)n, sizeof *places, brighter_first);
@@ -86,25 +100,33 @@ static bool measure_spot(struct session *s, const char *lamp, const struct spot 
 static bool measure_spots(struct session *s, struct lamp_report *lamp, const struct spot *places,
                           int count, struct error *err)
 {
-    struct spot taken[SPOTS];
-    double measured = 0, mapped = 0, limit = INFINITY;
-    for (int i = 0; i < count && lamp->spots < SPOTS; i++) {
+    struct spot taken[FACTS_SPOTS];
+    double limit = INFINITY;
+    for (int i = 0; i < count && lamp->spots < FACTS_SPOTS; i++) {
         double cdm2;
         if (places[i].map_cdm2 > limit || !far_from(taken, lamp->spots, &places[i]))
             continue;
         if (measure_spot(s, lamp->name, &places[i], &cdm2, err)) {
+            lamp->spot_ratios[lamp->spots] = cdm2 / places[i].map_cdm2;
             taken[lamp->spots++] = places[i];
-            measured += cdm2;
-            mapped += places[i].map_cdm2;
         } else if (err->code == ERROR_RANGE) {
             limit = STEP_DOWN * places[i].map_cdm2;
         } else {
             return false;
         }
     }
-    if (!lamp->spots)
-        return fail(err, ERROR_DATA, "no even place of the luminance map that the radiometer can read");
-    lamp->map_scale = measured / mapped;
+    return lamp->spots || fail(err, ERROR_DATA, "no even place that the radiometer can read");
+}
+
+static bool agree(struct lamp_report *lamp, struct error *err)
+{
+    struct summary all = summarise(lamp->spot_ratios, lamp->spots);
+    lamp->map_scale = all.median;
+    for (int i = 0; i < lamp->spots; i++)
+        if (fabs(lamp->spot_ratios[i] / all.median - 1) > AGREE)
+            return fail(err, ERROR_DATA,
+                        "spot reading %d scales the map by %.4f, the median of all by %.4f", i + 1,
+                        lamp->spot_ratios[i], all.median);
     return true;
 }
 
@@ -121,7 +143,7 @@ static bool scale_map(struct session *s, const char *path, struct lamp_report *l
     }
     int count = even_places(&map, places);
     luminance_map_fini(&map);
-    bool fine = measure_spots(s, lamp, places, count, err);
+    bool fine = measure_spots(s, lamp, places, count, err) && agree(lamp, err);
     free(places);
     return fine || while_doing(err, "%s", path);
 }
@@ -142,12 +164,17 @@ static bool save(struct session *s, const char *map, const struct lamp_report *l
     return lamp_save(s->settings.lamps.folder, &taught, err);
 }
 
+void session_map(const struct session *s, int lamp, char *path, size_t size)
+{
+    snprintf(path, size, "%s/ceiling-%s.exr", s->maps, s->facts->lamps[lamp].name);
+}
+
 bool session_teach(struct session *s, int index, struct error *err)
 {
     struct lamp_report *lamp = &s->facts->lamps[index];
     char map[512];
     lamp->teach_readings = TEACH_READINGS;
-    snprintf(map, sizeof map, "%.400s/ceiling-%.63s.exr", s->maps, lamp->name);
+    session_map(s, index, map, sizeof map);
     if (!bench_lamp(&s->bench, lamp->name, err) || !steady_light(s, lamp->name, err) ||
         !bench_teach(&s->bench, lamp->name, TEACH_READINGS, &lamp->irradiance, &lamp->spread,
                      &lamp->lux, err) ||

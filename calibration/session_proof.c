@@ -8,6 +8,8 @@
 #include "calibration/session.h"
 #include "config/materials.h"
 
+enum { SETTLE_ATTEMPTS = 20, LOOKS = 5 };
+static const double STILL_DEG = 0.1, STILL_M = 0.015; // twice what noise moves them between looks
 static const double POSE_TILTS_DEG[] = {10, 20, 45};
 static const struct vec3 POSE_EYES[] = {{-0.10, 0.55, 0.60}, {0.12, 0.50, 0.70}};
 
@@ -50,6 +52,7 @@ static bool simulate(struct lamp_report *lamp, const struct material *chart, int
     if (!band_set_shipped(bands, &set, err) ||
         !band_matrix_adapted(&set, &lamp->irradiance, OBSERVER_1931_2, &matrix, err))
         return false;
+    lamp->white_taught = xyz_relative(&lamp->irradiance, NULL, OBSERVER_1931_2);
     for (int i = 0; i < lamp->patch_count; i++) {
         struct bands c = bands_of(&set, &chart->palette[i]);
         lamp->patches[i].full = xyz_relative(&lamp->irradiance, &chart->palette[i], OBSERVER_1931_2);
@@ -67,7 +70,9 @@ static int lightest(const struct lamp_report *lamp)
     return best;
 }
 
-static bool measure_patches(struct session *s, struct lamp_report *lamp, struct error *err)
+// Reference and reading of a patch are taken together, since lamps drift.
+static bool measure_patches(struct session *s, struct lamp_report *lamp,
+                            const struct material *chart, struct error *err)
 {
     struct bench *b = &s->bench;
     int x = s->settings.screen.width_px / 2, y = s->settings.screen.height_px / 2;
@@ -76,6 +81,7 @@ static bool measure_patches(struct session *s, struct lamp_report *lamp, struct 
         char what[160];
         snprintf(what, sizeof what, "%s under %s", p->name, lamp->name);
         if (!bench_show(b, s->material, p->name, err) || !bench_in_gamut(b, x, y, &p->in_gamut, err) ||
+            !references(s, lamp, &chart->palette[i], 1, &p->reference, err) ||
             !bench_measure(b, what, &p->measured, &p->reading, err))
             return false;
         bench_progress(b, lamp->name, i + 1, lamp->patch_count);
@@ -106,21 +112,10 @@ static bool take_names(struct lamp_report *lamp, const struct material *chart, s
     return true;
 }
 
-static bool reference_patches(struct session *s, struct lamp_report *lamp,
-                              const struct material *chart, struct error *err)
-{
-    struct xyz references_xyz[FACTS_PATCHES];
-    if (!references(s, lamp, chart->palette, lamp->patch_count, references_xyz, err))
-        return false;
-    for (int i = 0; i < lamp->patch_count; i++)
-        lamp->patches[i].reference = references_xyz[i];
-    return true;
-}
-
 static bool picture(struct session *s, struct lamp_report *lamp, struct error *err)
 {
     char path[sizeof lamp->picture];
-    snprintf(path, sizeof path, "%.400s/chart-%.60s.png", s->out, lamp->name);
+    snprintf(path, sizeof path, "%s/chart-%s.png", s->out, lamp->name);
     memcpy(lamp->picture, path, sizeof path);
     return bench_show(&s->bench, s->material, NULL, err) &&
            bench_capture(&s->bench, lamp->picture, err);
@@ -133,8 +128,7 @@ static bool proof_chart(struct session *s, struct lamp_report *lamp, const struc
         return false;
     lamp->white_patch = lightest(lamp);
     return measure_white(s, lamp, &lamp->white_reference, &lamp->white_measured, err) &&
-           reference_patches(s, lamp, chart, err) && measure_patches(s, lamp, err) &&
-           picture(s, lamp, err) && proof_judge(lamp, err);
+           measure_patches(s, lamp, chart, err) && picture(s, lamp, err) && proof_judge(lamp, err);
 }
 
 bool session_proof(struct session *s, int index, struct error *err)
@@ -152,7 +146,8 @@ bool session_proof(struct session *s, int index, struct error *err)
     return fine || while_doing(err, "lamp %s", lamp->name);
 }
 
-static bool seen(struct session *s, struct pose_report *pose, struct error *err)
+// One look at the daemon's belief: tilt, and the eye added to *eyes.
+static bool seen(struct session *s, struct pose_report *pose, struct vec3 *eyes, struct error *err)
 {
     json_t *status = bench_status(&s->bench, err);
     if (!status)
@@ -160,25 +155,32 @@ static bool seen(struct session *s, struct pose_report *pose, struct error *err)
     const json_t *eye = json_object_get(json_object_get(status, "eye"), "eye_m");
     pose->tilt_seen_deg =
         json_number_value(json_object_get(json_object_get(status, "tilt"), "tilt_deg"));
-    pose->eye_seen = (struct vec3){json_number_value(json_array_get(eye, 0)),
-                                   json_number_value(json_array_get(eye, 1)),
-                                   json_number_value(json_array_get(eye, 2))};
+    *eyes = vec3_add(*eyes, (struct vec3){json_number_value(json_array_get(eye, 0)),
+                                          json_number_value(json_array_get(eye, 1)),
+                                          json_number_value(json_array_get(eye, 2))});
     json_decref(status);
     return true;
 }
 
 static bool settle(struct session *s, struct pose_report *pose, struct error *err)
 {
-    double before = NAN;
-    for (int i = 0; i < 100; i++) {
-        if (!seen(s, pose, err))
-            return false;
-        if (fabs(pose->tilt_seen_deg - before) < 0.05 && i > 5)
+    for (int attempt = 0; attempt < SETTLE_ATTEMPTS; attempt++) {
+        struct vec3 eyes = {0};
+        double least = INFINITY, most = -INFINITY;
+        for (int i = 0; i < LOOKS; i++) {
+            clock_sleep_until_ns(clock_now_ns() + 100 * NS_PER_MS);
+            if (!seen(s, pose, &eyes, err))
+                return false;
+            least = fmin(least, pose->tilt_seen_deg);
+            most = fmax(most, pose->tilt_seen_deg);
+        }
+        struct vec3 before = pose->eye_seen;
+        pose->eye_seen = vec3_scale(eyes, 1.0 / LOOKS);
+        if (attempt && most - least < STILL_DEG &&
+            vec3_length(vec3_sub(before, pose->eye_seen)) < STILL_M)
             return true;
-        before = pose->tilt_seen_deg;
-        clock_sleep_until_ns(clock_now_ns() + 100 * NS_PER_MS);
     }
-    return fail(err, ERROR_RETRY, "the tilt did not settle");
+    return fail(err, ERROR_RETRY, "tilt or head did not settle");
 }
 
 static bool tilted(struct session *s, double tilt_deg, struct pose_report *pose, struct error *err)
@@ -189,6 +191,8 @@ static bool tilted(struct session *s, double tilt_deg, struct pose_report *pose,
     if (!bench_tilt(&s->bench, tilt_deg, err) || !settle(s, pose, err) ||
         !measure_white(s, lamp, &pose->reference, &pose->measured, err))
         return false;
+    if (!(pose->reference.Y > 0))
+        return fail(err, ERROR_DATA, "tilt %.0f: the reference is dark", tilt_deg);
     pose->error_percent = 100 * (pose->measured.Y / pose->reference.Y - 1);
     return true;
 }

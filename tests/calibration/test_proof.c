@@ -51,7 +51,7 @@ static void fill(struct lamp_report *lamp, double factor)
 {
     static const struct xyz colours[3] = {{42, 45, 30}, {20, 10, 5}, {8, 12, 20}};
     memset(lamp, 0, sizeof *lamp);
-    lamp->white_reference = (struct xyz){48, 50, 40};
+    lamp->white_reference = lamp->white_taught = (struct xyz){48, 50, 40};
     lamp->white_measured = (struct xyz){48 * factor, 50 * factor, 40 * factor};
     lamp->patch_count = 3;
     for (int i = 0; i < 3; i++) {
@@ -69,6 +69,7 @@ static void a_screen_that_is_only_too_bright_is_right_as_published_and_wrong_abs
     fill(&lamp, 1.05);
     assert_true(proof_judge(&lamp, NULL));
     assert_float_equal(lamp.proof.published.max, 0, EXACT);
+    assert_false(lamp.reached);
     assert_true(lamp.proof.absolute.mean > 0.3);
     assert_float_equal(lamp.white_error_percent, 5, EXACT);
     assert_float_equal(lamp.proof.simulation.max, 0, EXACT);
@@ -102,6 +103,23 @@ static void the_published_method_puts_the_white_patch_at_its_own_reflectance(voi
     assert_true(a.L > 95 && a.L < 96);
 }
 
+static void targets_are_reached_just_when_all_are(void **state)
+{
+    (void)state;
+    struct lamp_report lamp;
+    fill(&lamp, 1.009);
+    assert_true(proof_judge(&lamp, NULL) && lamp.reached);
+    fill(&lamp, 1.011);
+    assert_true(proof_judge(&lamp, NULL) && !lamp.reached);
+    fill(&lamp, 1);
+    lamp.patches[2].measured.Z *= 1.2;
+    assert_true(proof_judge(&lamp, NULL) && !lamp.reached);
+    fill(&lamp, 1);
+    for (int i = 0; i < 3; i++)
+        lamp.patches[i].in_gamut = false;
+    assert_true(proof_judge(&lamp, NULL) && !lamp.reached);
+}
+
 static void a_dark_white_is_refused_with_the_lamps_name(void **state)
 {
     (void)state;
@@ -123,6 +141,7 @@ int main(void)
         cmocka_unit_test(a_screen_that_is_only_too_bright_is_right_as_published_and_wrong_absolutely),
         cmocka_unit_test(patches_out_of_gamut_are_summed_up_apart),
         cmocka_unit_test(the_published_method_puts_the_white_patch_at_its_own_reflectance),
+        cmocka_unit_test(targets_are_reached_just_when_all_are),
         cmocka_unit_test(a_dark_white_is_refused_with_the_lamps_name),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -27,7 +27,7 @@ static int a_session_with_two_patches(void **state)
     facts.lamp_count = 1;
     struct lamp_report *lamp = &facts.lamps[0];
     strcpy(lamp->name, "D65");
-    lamp->white_reference = lamp->white_measured = (struct xyz){95, 100, 108};
+    lamp->white_reference = lamp->white_measured = lamp->white_taught = (struct xyz){95, 100, 108};
     lamp->patch_count = 2;
     for (int i = 0; i < SPECTRUM_COUNT; i++)
         lamp->irradiance.v[i] = i;

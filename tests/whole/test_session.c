@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <setjmp.h>
@@ -34,7 +35,8 @@ static int a_rehearsed_session(void **state)
     if (!mkdtemp(folder))
         return -1;
     snprintf(line, sizeof line, "calibration/demo.sh %s --rehearse >%s/said 2>&1", folder, folder);
-    if (system(line)) {
+    int status = system(line); // 3: a rehearsal may miss the targets of a whole session
+    if (status && WEXITSTATUS(status) != 3) {
         snprintf(line, sizeof line, "cat %s/said %s/boothd.log", folder, folder);
         return system(line), -1;
     }
@@ -57,10 +59,20 @@ static const json_t *lamp(size_t i)
     return json_array_get(json_object_get(report, "lamps"), i);
 }
 
+// A figure that must be there.
+static double number_of(const json_t *object, const char *key)
+{
+    const json_t *value = json_object_get(object, key);
+    if (!json_is_number(value))
+        print_error("no number \"%s\" in the report\n", key);
+    assert_true(json_is_number(value));
+    return json_number_value(value);
+}
+
 static double figure(size_t i, const char *which, const char *what)
 {
     const json_t *all = json_object_get(lamp(i), "de00");
-    double v = json_number_value(json_object_get(json_object_get(all, which), what));
+    double v = number_of(json_object_get(all, which), what);
     print_message("lamp %s, %s: %s %.3f\n", json_string_value(json_object_get(lamp(i), "name")), which,
                   what, v);
     return v;
@@ -84,6 +96,7 @@ static void six_bands_simulate_the_chart(void **state)
     (void)state;
     for (size_t i = 0; i < 3; i++) {
         assert_true(figure(i, "simulation", "mean") <= BANDS_MEAN);
+        assert_true(figure(i, "simulation", "mean") > 0);
         assert_true(figure(i, "simulation", "max") <= BANDS_MAX);
     }
 }
@@ -92,13 +105,16 @@ static void white_has_its_absolute_luminance_at_every_tilt(void **state)
 {
     (void)state;
     for (size_t i = 0; i < 3; i++)
-        assert_true(fabs(json_number_value(json_object_get(
-                        lamp(i), "white_luminance_error_percent"))) <= WHITE_PERCENT);
-    size_t i;
+        assert_true(fabs(number_of(lamp(i), "white_luminance_error_percent")) <= WHITE_PERCENT);
+    size_t i, measured = 0;
     json_t *pose;
-    json_array_foreach(json_object_get(report, "poses"), i, pose)
-        assert_true(fabs(json_number_value(json_object_get(pose, "white_luminance_error_percent"))) <=
-                    WHITE_PERCENT);
+    json_array_foreach(json_object_get(report, "poses"), i, pose) {
+        if (!json_object_get(pose, "white_measured_cdm2"))
+            continue; // only the head moved
+        measured++;
+        assert_true(fabs(number_of(pose, "white_luminance_error_percent")) <= WHITE_PERCENT);
+    }
+    assert_int_equal(measured, 4);
 }
 
 static void tilt_and_eye_are_seen_where_they_are(void **state)
@@ -108,11 +124,11 @@ static void tilt_and_eye_are_seen_where_they_are(void **state)
     json_t *pose;
     assert_true(json_array_size(json_object_get(report, "poses")) >= 5);
     json_array_foreach(json_object_get(report, "poses"), i, pose) {
-        double truth[3], seen[3], tilt = json_number_value(json_object_get(pose, "tilt_deg"));
+        double truth[3], seen[3], tilt = number_of(pose, "tilt_deg");
         assert_int_equal(json_unpack(pose, "{s[FFF]s[FFF]}", "eye_m", &truth[0], &truth[1], &truth[2],
                                      "eye_seen_m", &seen[0], &seen[1], &seen[2]),
                          0);
-        assert_true(fabs(tilt - json_number_value(json_object_get(pose, "tilt_seen_deg"))) <= TILT_DEG);
+        assert_true(fabs(tilt - number_of(pose, "tilt_seen_deg")) <= TILT_DEG);
         assert_true(hypot(hypot(truth[0] - seen[0], truth[1] - seen[1]), truth[2] - seen[2]) <= EYE_M);
     }
 }
