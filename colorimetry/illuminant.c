@@ -70,7 +70,7 @@ static double linear_5nm(const double *values, int i)
 static bool from_table(const struct illuminant_table *table, struct spectrum *out,
                        struct error *err)
 {
-    if (table->count == DAYLIGHT_BASIS_COUNT) {
+    if (table->linear) {
         for (int i = 0; i < SPECTRUM_COUNT; i++)
             out->v[i] = linear_5nm(table->values, i);
         return true;

@@ -18,8 +18,9 @@ extern const double DAYLIGHT_BASIS[3][DAYLIGHT_BASIS_COUNT];
 struct illuminant_table {
     const char *name;
     int first_nm;
-    size_t count;
+    size_t count; // <= DAYLIGHT_BASIS_COUNT
     const double *values;
+    bool linear; // defined by straight lines between its values
 };
 
 extern const struct illuminant_table ILLUMINANT_TABLES[];
