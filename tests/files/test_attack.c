@@ -272,8 +272,6 @@ static void real_files_stand(void **state)
     for (size_t i = 0; i < sizeof REAL / sizeof *REAL; i++) {
         size_t size;
         const char *path = shared_file(REAL[i].name);
-        if (!path)
-            continue;
         char *bytes = take(path, &size);
         REAL[i].attack(bytes, size);
         cut(bytes, size, size / 40 + 1, REAL[i].attack);
