@@ -17,7 +17,7 @@ boothsim_in := simulator
 PACKAGES := git make gcc g++ libc6-dev pkg-config libusb-1.0-0-dev libudev-dev libmodbus-dev libhidapi-dev \
   libopencv-core-dev libopencv-calib3d-dev libceres-dev libopenexr-dev libglfw3-dev libepoxy-dev \
   libegl-dev libgl1-mesa-dri libinih-dev libjansson-dev libpng-dev libmatio-dev libsystemd-dev \
-  libcmocka-dev libumockdev-dev umockdev xvfb xauth systemd psychtoolbox-3-common
+  libcmocka-dev libumockdev-dev umockdev xvfb xauth systemd psychtoolbox-3-common clang-format
 PKGS := libusb-1.0 libudev libmodbus hidapi-hidraw OpenEXR glfw3 epoxy egl inih jansson libpng matio \
   libsystemd cmocka umockdev-1.0
 
@@ -121,11 +121,14 @@ layers:
 check:
 	@$(MAKE) -s deps
 	$(MAKE) layers links
-	$(MAKE) check-here
-	$(MAKE) BUILD=$(BUILD)/asan FLAVOUR=sanitize check-here
-	@tests/run.sh --total $(BUILD)/results $(BUILD)/asan/results
+	@rm -f $(BUILD)/results $(BUILD)/asan/results
+	@failed=0; \
+	$(MAKE) check-here || failed=1; \
+	$(MAKE) BUILD=$(BUILD)/asan FLAVOUR=sanitize check-here || failed=1; \
+	tests/run.sh --total $(BUILD)/results $(BUILD)/asan/results || failed=1; \
+	exit $$failed
 
-check-here: all $(TESTS:%.c=$(BUILD)/%)
+check-here: all $(TESTS:%.c=$(BUILD)/%) $(BUILD)/tests/bench/bench
 	BUILD=$(BUILD) tests/run.sh $(BUILD)/results $(TESTS:%.c=$(BUILD)/%)
 
 demo:
@@ -195,4 +198,4 @@ uninstall:
 clean:
 	rm -rf build
 
--include $(patsubst %,$(BUILD)/%.d,$(basename $(SOURCES) $(MAINS) $(TESTS) $(FAKES)))
+-include $(patsubst %,$(BUILD)/%.d,$(basename $(SOURCES) $(MAINS) $(TESTS) $(FAKES) tests/bench/bench.c))
