@@ -23,7 +23,7 @@ enum address {
     TEMPERATURE = 0x40,
     QUATERNION = 0x51,
     KEY = 0x69,
-    SERIAL = 0x7A,
+    NUMBER = 0x7F,
 };
 
 enum { KEY_OPEN = 0xB588, BAUD_9600 = 2, RATE_10_HZ = 6 };
@@ -57,7 +57,7 @@ void witmotion_init(struct witmotion *device, const struct around *around, const
     r[BANDWIDTH] = 4;
     r[VERSION] = 4110;
     for (size_t i = 0; i < 12 && i < strlen(serial); i++)
-        r[SERIAL + i / 2] |= (uint16_t)((uint8_t)serial[i] << (i % 2 ? 0 : 8));
+        r[NUMBER + i / 2] |= (uint16_t)((uint8_t)serial[i] << (i % 2 ? 0 : 8));
     witmotion_refresh(device, now_ns);
 }
 

@@ -6,7 +6,7 @@
 #include "simulator/around.h"
 #include "simulator/model_noise.h"
 
-enum { WITMOTION_ADDRESS = 0x50, WITMOTION_BAUD = 9600, WITMOTION_REGISTERS = 0x80 };
+enum { WITMOTION_ADDRESS = 0x50, WITMOTION_BAUD = 9600, WITMOTION_REGISTERS = 0x85 };
 
 struct witmotion {
     struct around around;
@@ -15,7 +15,7 @@ struct witmotion {
     uint16_t registers[WITMOTION_REGISTERS];
 };
 
-// serial: up to 12 characters, kept in the registers 0x7A..0x7F (two a register).
+// serial: up to 12 characters, kept in the registers 0x7F..0x84 (two a register).
 void witmotion_init(struct witmotion *device, const struct around *around, const char *serial,
                     uint64_t seed, int64_t now_ns);
 

@@ -87,8 +87,8 @@ static void it_bears_its_serial_and_address(void **state)
 {
     (void)state;
     assert_int_equal(device.registers[0x1A], 0x50);
-    assert_int_equal(device.registers[0x7A], 'E' << 8 | 'M');
-    assert_int_equal(device.registers[0x7B], 'U' << 8 | 'W');
+    assert_int_equal(device.registers[0x7F], 'E' << 8 | 'M');
+    assert_int_equal(device.registers[0x80], 'U' << 8 | 'W');
 }
 
 static void temperature_is_a_room_s(void **state)

@@ -169,7 +169,9 @@ static void every_instrument_runs_and_says_that_it_is_emulated(void **state)
     json_t *status = ask(json_pack("{ss}", "do", "status"));
     assert_true(json_is_true(dig(status, "emulated")));
     assert_true(json_is_true(dig(status, "instruments.spectrometer.emulated")));
+    assert_true(json_is_true(dig(status, "instruments.accelerometer.emulated")));
     assert_holds(text(status, "instruments.spectrometer.serial"), "EMU");
+    assert_string_equal(text(status, "instruments.accelerometer.serial"), "EMUWT901");
     assert_string_equal(text(status, "instruments.radiometer.state"), "idle");
     json_decref(status);
     json_decref(await_text("lamp.verdict", "unknown")); // nothing was taught
