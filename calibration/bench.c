@@ -100,17 +100,25 @@ static bool take_spectrum(const json_t *reply, struct spectrum *out, struct erro
     return true;
 }
 
-bool bench_teach(struct bench *b, const char *lamp, int readings, struct spectrum *irradiance,
-                 double *spread, double *lux, struct error *err)
+void bench_instrument(const json_t *reply, char *name, size_t size)
+{
+    const char *model = json_string_value(json_object_get(reply, "instrument"));
+    const char *serial = json_string_value(json_object_get(reply, "serial"));
+    snprintf(name, size, "%s %s", model ? model : "unnamed", serial ? serial : "");
+}
+
+bool bench_teach(struct bench *b, const char *lamp, int readings, struct taught *out,
+                 struct error *err)
 {
     json_t *request = json_pack("{ss,ss,si}", "do", CONTROL_TEACH, "lamp", lamp, "readings", readings);
     json_t *reply = daemon_call(b, request, err);
-    if (!reply || !take_spectrum(reply, irradiance, err)) {
+    if (!reply || !take_spectrum(reply, &out->irradiance, err)) {
         json_decref(reply);
         return while_doing(err, "teaching lamp %s", lamp);
     }
-    *spread = json_number_value(json_object_get(reply, "spread"));
-    *lux = json_number_value(json_object_get(reply, "lux"));
+    out->spread = json_number_value(json_object_get(reply, "spread"));
+    out->lux = json_number_value(json_object_get(reply, "lux"));
+    bench_instrument(reply, out->instrument, sizeof out->instrument);
     json_object_del(reply, "ok");
     json_object_set_new(reply, "what", json_sprintf("teach %s", lamp));
     json_array_append_new(b->readings, reply);

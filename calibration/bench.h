@@ -38,10 +38,19 @@ bool bench_in_gamut(struct bench *b, int x_px, int y_px, bool *in_gamut, struct 
 bool bench_capture(struct bench *b, const char *path, struct error *err);
 bool bench_reload(struct bench *b, struct error *err);
 
-// Averaged spectrum (W m-2 nm-1) of the lamp now on, from `readings` fresh
-// ones, with its relative spread and illuminance in lux.
-bool bench_teach(struct bench *b, const char *lamp, int readings, struct spectrum *irradiance,
-                 double *spread, double *lux, struct error *err);
+// "model serial" of the instrument that a reading came from.
+void bench_instrument(const json_t *reply, char *name, size_t size);
+
+// A lamp as its spectrometer saw it.
+struct taught {
+    struct spectrum irradiance; // W m-2 nm-1
+    double spread, lux;         // relative rms of the readings; illuminance
+    char instrument[128];       // model and serial
+};
+
+// Average of `readings` fresh readings of the lamp now on.
+bool bench_teach(struct bench *b, const char *lamp, int readings, struct taught *out,
+                 struct error *err);
 
 // Waits until the daemon is sure of lamp ("" = dark), at most timeout_s.
 bool bench_await_lamp(struct bench *b, const char *lamp, double timeout_s, struct error *err);

@@ -39,7 +39,7 @@ struct lamp_report {
     int teach_readings;
     struct xy chromaticity;
     struct cct cct;
-    double map_scale; // median of the spot readings over what the map says there
+    double map_scale; // median of the spot readings over the map, at the taught level
     int spots;
     double spot_ratios[FACTS_SPOTS];
     struct xyz white_taught;                    // perfect diffuser under the taught spectrum, Y = 100

@@ -31,15 +31,6 @@ static bool measure_set(struct session *s, struct patch_set *set, const char *st
     return true;
 }
 
-static void instrument_name(struct session *s, char *name, size_t size)
-{
-    const json_t *last =
-        json_array_get(s->bench.readings, json_array_size(s->bench.readings) - 1);
-    const char *model = json_string_value(json_object_get(last, "instrument"));
-    const char *serial = json_string_value(json_object_get(last, "serial"));
-    snprintf(name, size, "%s %s", model ? model : "radiometer", serial ? serial : "");
-}
-
 static bool measure(struct session *s, struct patch_set *fit, struct patch_set *verify,
                     const char *verify_path, struct error *err)
 {
@@ -49,7 +40,8 @@ static bool measure(struct session *s, struct patch_set *fit, struct patch_set *
                           s->settings.screen.height_px / 2.0, err) ||
         !measure_set(s, fit, "characterise", err) || !measure_set(s, verify, "verify", err))
         return false;
-    instrument_name(s, instrument, sizeof instrument);
+    bench_instrument(json_array_get(s->bench.readings, json_array_size(s->bench.readings) - 1),
+                     instrument, sizeof instrument);
     if (!patch_set_white(fit, &d->white))
         return fail(err, ERROR_DATA, "no white was measured");
     d->patches = fit->count;

@@ -8,7 +8,7 @@
 #include "calibration/session.h"
 #include "config/lamps.h"
 
-enum { TEACH_READINGS = 10, PROBE_READINGS = 2, GRID = 24, CANDIDATES = 2 * GRID * GRID };
+enum { TEACH_READINGS = 10, PROBE_READINGS = 2, STEADY_ATTEMPTS = 50, GRID = 24, CANDIDATES = 2 * GRID * GRID };
 static const double STEADY = 0.005;    // relative change of illuminance between two short readings
 static const double SPOT_M = 0.010;    // what the radiometer sees of the ceiling
 static const double BESIDE_M = 0.005; // twice what aiming may be off
@@ -19,16 +19,15 @@ static const double STEP_DOWN = 0.6;  // of a luminance that overloaded the radi
 
 static bool steady_light(struct session *s, const char *lamp, struct error *err)
 {
-    double before = 0, lux = 0, spread;
-    struct spectrum ignored;
-    for (int attempt = 0; attempt < 20; attempt++) {
-        if (!bench_teach(&s->bench, lamp, PROBE_READINGS, &ignored, &spread, &lux, err))
+    struct taught now = {.lux = 0};
+    for (int attempt = 0; attempt < STEADY_ATTEMPTS; attempt++) {
+        double before = now.lux;
+        if (!bench_teach(&s->bench, lamp, PROBE_READINGS, &now, err))
             return false;
-        if (before > 0 && fabs(lux / before - 1) < STEADY)
+        if (before > 0 && fabs(now.lux / before - 1) < STEADY)
             return true;
-        before = lux;
     }
-    return fail(err, ERROR_RETRY, "lamp %s is not steady: %.0f lx, before %.0f lx", lamp, lux, before);
+    return fail(err, ERROR_RETRY, "lamp %s does not become steady; now %.0f lx", lamp, now.lux);
 }
 
 struct spot {
@@ -149,19 +148,18 @@ static bool scale_map(struct session *s, const char *path, struct lamp_report *l
 }
 
 static bool save(struct session *s, const char *map, const struct lamp_report *lamp,
-                 struct error *err)
+                 const struct taught *taught, struct error *err)
 {
-    struct lamp taught = {.file = {.spread = lamp->spread,
-                                    .map_scale = lamp->map_scale,
-                                    .taught_lux = lamp->lux,
-                                    .readings = lamp->teach_readings},
-                          .irradiance = lamp->irradiance};
-    snprintf(taught.file.name, sizeof taught.file.name, "%s", lamp->name);
-    snprintf(taught.file.map, sizeof taught.file.map, "%s", map);
-    snprintf(taught.file.instrument, sizeof taught.file.instrument, "%s",
-             s->settings.spectrometer.options.serial);
-    clock_utc(taught.file.taught_at);
-    return lamp_save(s->settings.lamps.folder, &taught, err);
+    struct lamp out = {.file = {.spread = taught->spread,
+                                .map_scale = lamp->map_scale,
+                                .taught_lux = taught->lux,
+                                .readings = TEACH_READINGS},
+                       .irradiance = taught->irradiance};
+    snprintf(out.file.name, sizeof out.file.name, "%s", lamp->name);
+    snprintf(out.file.map, sizeof out.file.map, "%s", map);
+    snprintf(out.file.instrument, sizeof out.file.instrument, "%s", taught->instrument);
+    clock_utc(out.file.taught_at);
+    return lamp_save(s->settings.lamps.folder, &out, err);
 }
 
 void session_map(const struct session *s, int lamp, char *path, size_t size)
@@ -169,17 +167,33 @@ void session_map(const struct session *s, int lamp, char *path, size_t size)
     snprintf(path, size, "%s/ceiling-%s.exr", s->maps, s->facts->lamps[lamp].name);
 }
 
+// The lamp drifts while the spots are read: the map belongs to the level at
+// teaching, the spots to the mean of it and the level after them.
+static bool allow_for_drift(struct session *s, struct lamp_report *lamp, const struct taught *taught,
+                            struct error *err)
+{
+    struct taught after;
+    if (!bench_teach(&s->bench, lamp->name, PROBE_READINGS, &after, err))
+        return false;
+    lamp->map_scale /= (1 + after.lux / taught->lux) / 2;
+    return true;
+}
+
 bool session_teach(struct session *s, int index, struct error *err)
 {
     struct lamp_report *lamp = &s->facts->lamps[index];
+    struct taught taught;
     char map[512];
-    lamp->teach_readings = TEACH_READINGS;
     session_map(s, index, map, sizeof map);
     if (!bench_lamp(&s->bench, lamp->name, err) || !steady_light(s, lamp->name, err) ||
-        !bench_teach(&s->bench, lamp->name, TEACH_READINGS, &lamp->irradiance, &lamp->spread,
-                     &lamp->lux, err) ||
-        !scale_map(s, map, lamp, err) || !save(s, map, lamp, err))
+        !bench_teach(&s->bench, lamp->name, TEACH_READINGS, &taught, err) ||
+        !scale_map(s, map, lamp, err) || !allow_for_drift(s, lamp, &taught, err) ||
+        !save(s, map, lamp, &taught, err))
         return while_doing(err, "teaching lamp %s", lamp->name);
+    lamp->irradiance = taught.irradiance;
+    lamp->spread = taught.spread;
+    lamp->lux = taught.lux;
+    lamp->teach_readings = TEACH_READINGS;
     lamp->chromaticity = xy_of(xyz_absolute(&lamp->irradiance, OBSERVER_1931_2));
     lamp->cct = cct_of(lamp->chromaticity);
     return true;
