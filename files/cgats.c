@@ -87,8 +87,8 @@ static char *copy_text(const struct token *token)
     char *copy = strndup(token->text, token->size);
     if (!copy)
         return NULL;
-    for (size_t at; (at = text_utf8_end(copy, token->size)) < token->size;)
-        copy[at] = '?';
+    for (size_t at = 0; (at += text_utf8_end(copy + at, token->size - at)) < token->size;)
+        copy[at++] = '?';
     if (token->quoted)
         undouble_quotes(copy);
     return copy;
@@ -477,6 +477,15 @@ static bool check_bytes(const char *path, const char *text, size_t size, struct 
     return fail(err, ERROR_DATA, "%s:%d: byte 0x00 is not text", path, line);
 }
 
+// Line ends of the old Macintosh: a file without any other.
+static void mend_line_ends(char *text, size_t size)
+{
+    if (memchr(text, '\n', size))
+        return;
+    for (char *at = text; (at = memchr(at, '\r', (size_t)(text + size - at)));)
+        *at = '\n';
+}
+
 bool cgats_load(const char *path, struct cgats *file, struct error *err)
 {
     *file = (struct cgats){0};
@@ -485,6 +494,7 @@ bool cgats_load(const char *path, struct cgats *file, struct error *err)
     char *text = file_read(path, BYTES_MOST, &size, err);
     bool ok = text && check_bytes(path, text, size, err);
     if (ok) {
+        mend_line_ends(text, size);
         size_t mark = size >= 3 && !memcmp(text, "\xef\xbb\xbf", 3) ? 3 : 0;
         struct reader r = {path, text + mark, text + size, 1, true, {0}, err};
         ok = read_first(&r, file) && read_others(&r, file);

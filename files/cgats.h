@@ -25,8 +25,9 @@ struct cgats {
 void cgats_fini(struct cgats *file);
 
 // Reads the first table; later tables (a .ti3's CAL) are checked for form and
-// left out, as are foreign BEGIN_X..END_X blocks. Rows may wrap. Bytes that are
-// not UTF-8 come back as '?' in keyword values and labels. Refuses (DATA),
+// left out, as are foreign BEGIN_X..END_X blocks. Rows may wrap. Lines end in LF,
+// CR LF, or CR alone throughout. Bytes that are not UTF-8 come back as '?' in
+// keyword values and labels. Refuses (DATA),
 // naming file, line, key and what was expected: an identifier that is missing,
 // NUMBER_OF_FIELDS or NUMBER_OF_SETS that contradicts the data (either may be
 // missing), a duplicate field, a cell that is no finite number, a keyword with

@@ -222,6 +222,27 @@ static bool bad_cell(struct csv *csv, size_t column, struct cell cell, struct er
                 text_number_fault(cell.text, cell.size));
 }
 
+// "1,05" in a table that commas separate reads as 1 and 05.
+static bool is_comma_tail(const struct csv *csv, size_t column, struct cell cell)
+{
+    if (!column || csv->separator != ',' || cell.quoted || cell.size < 2 || *cell.text != '0')
+        return false;
+    for (size_t i = 0; i < cell.size; i++)
+        if (cell.text[i] < '0' || cell.text[i] > '9')
+            return false;
+    return true;
+}
+
+static bool ambiguous(struct csv *csv, size_t column, struct cell cell, struct error *err)
+{
+    char shown[TEXT_SHOWN];
+    text_shown(shown, cell.text, cell.size);
+    return fail(err, ERROR_DATA,
+                "%s:%d: column %zu: \"%s\" may be a number of its own or what follows a decimal "
+                "comma (\",%s\"); allowed: a decimal point, no zero before other digits",
+                csv->table->path, csv->line, column + 1, shown, shown);
+}
+
 static bool ragged(struct csv *csv, size_t cells, struct error *err)
 {
     return fail(err, ERROR_DATA, "%s:%d: row has %s%zu cells; allowed: %zu, as in the first line",
@@ -245,6 +266,8 @@ static bool read_row(struct csv *csv, struct error *err)
         double *value = &t->values[t->rows * t->columns + column];
         if (text_number(cell.text, cell.size, value) != TEXT_NUMBER)
             return bad_cell(csv, column, cell, err);
+        if (is_comma_tail(csv, column, cell))
+            return ambiguous(csv, column, cell, err);
     }
     if (column < t->columns)
         return ragged(csv, column, err);

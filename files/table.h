@@ -33,7 +33,8 @@ static inline double table_at(const struct table *table, size_t row, size_t colu
 // CSV: ',' ';' tab or spaces between cells, '#' comment lines, an optional
 // first line of names (a first line whose first cell is no number; names may
 // stand in double quotes). The first line decides which separator the file
-// uses. Decimal point only. Every row has the same number of cells, every cell a finite
+// uses. Decimal point only: what commas separate and begins with a zero like the
+// end of "1,05" is refused as ambiguous. Every row has the same number of cells, every cell a finite
 // number; a file that breaks this is refused with file, line, column and
 // cell. At most 65536 columns and 100 000 000 cells. Errors: SYSTEM when the file
 // cannot be read, DATA when it is not such a table.

@@ -111,6 +111,47 @@ static void line_ends_and_a_mark_change_nothing(void **state)
     cgats_fini(&file);
 }
 
+static void lines_may_end_in_carriage_returns_alone(void **state)
+{
+    (void)state;
+    struct cgats file;
+    char text[sizeof EXAMPLE];
+    strcpy(text, EXAMPLE);
+    for (char *c = text; *c; c++)
+        *c = *c == '\n' ? '\r' : *c;
+    good(text, &file);
+    assert_int_equal(file.table.rows, 3);
+    assert_string_equal(cgats_keyword(&file, "DESCRIPTOR"), "a \"good\" panel");
+    cgats_fini(&file);
+    char *change = strstr(text, "60.5");
+    memcpy(change, "60,5", 4);
+    bad(text, "a.ti3:22: field RGB_G: \"60,5\" has a decimal comma; allowed: a number with a decimal "
+              "point");
+}
+
+// Ten million would take days, were each looked for from the start.
+static void many_bytes_that_are_no_text_take_no_longer(void **state)
+{
+    (void)state;
+    enum { MANY = 10 << 20 };
+    static const char HEAD[] = "CTI3\nDESCRIPTOR \"", TAIL[] = "\"\nBEGIN_DATA_FORMAT\nX\n"
+                                                            "END_DATA_FORMAT\nBEGIN_DATA\n1\n"
+                                                            "END_DATA\n";
+    char *text = malloc(MANY + sizeof HEAD + sizeof TAIL);
+    size_t used = sizeof HEAD - 1;
+    memcpy(text, HEAD, used);
+    memset(text + used, 0xe9, MANY);
+    memcpy(text + used + MANY, TAIL, sizeof TAIL);
+    struct cgats file;
+    struct error err = {0};
+    assert_true(cgats_load(put_text("a.ti3", text), &file, &err));
+    const char *value = cgats_keyword(&file, "DESCRIPTOR");
+    assert_int_equal(strlen(value), MANY);
+    assert_int_equal(strspn(value, "?"), MANY);
+    cgats_fini(&file);
+    free(text);
+}
+
 static void all_cells_may_stand_on_one_line_or_on_one_each(void **state)
 {
     (void)state;
@@ -432,6 +473,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(an_example_is_read_as_it_stands),
         cmocka_unit_test(line_ends_and_a_mark_change_nothing),
+        cmocka_unit_test(lines_may_end_in_carriage_returns_alone),
+        cmocka_unit_test(many_bytes_that_are_no_text_take_no_longer),
         cmocka_unit_test(all_cells_may_stand_on_one_line_or_on_one_each),
         cmocka_unit_test(a_name_is_the_label_where_there_is_no_id),
         cmocka_unit_test(later_tables_are_checked_and_left_out),

@@ -122,6 +122,18 @@ static void decimal_commas_are_refused(void **state)
     bad("nm,E\n380,0,5\n", "t.csv:2: row has at least 3 cells; allowed: 2, as in the first line");
 }
 
+static void what_may_be_the_end_of_a_decimal_comma_is_refused(void **state)
+{
+    (void)state;
+    bad("nm,l,m\n380,1,00\n", "t.csv:2: column 3: \"00\" may be a number of its own or what follows "
+                              "a decimal comma (\",00\"); allowed: a decimal point, no zero before "
+                              "other digits");
+    struct table t = good("nm;l;m\n380;0;00\n", 3, 1);
+    table_fini(&t);
+    t = good("nm,l,m\n0380,0,0.05\n", 3, 1);
+    table_fini(&t);
+}
+
 static void what_is_not_finite_is_refused(void **state)
 {
     (void)state;
@@ -239,10 +251,10 @@ static void a_missing_file_and_a_folder_are_named(void **state)
     struct table t;
     struct error err = {0};
     assert_false(csv_load(at("none.csv"), &t, &err));
-    assert_int_equal(err.code, ERROR_SYSTEM);
+    assert_int_equal(err.code, ERROR_CONFIG);
     assert_complaint(err.text, "none.csv: cannot be read: No such file or directory");
     assert_false(csv_load(place, &t, &err));
-    assert_int_equal(err.code, ERROR_SYSTEM);
+    assert_int_equal(err.code, ERROR_CONFIG);
     assert_non_null(strstr(err.text, "Is a directory"));
     assert_false(csv_load(at("none.csv"), &t, NULL));
 }
@@ -293,6 +305,7 @@ int main(void)
         cmocka_unit_test(every_separator_and_line_end_gives_the_same_table),
         cmocka_unit_test(lines_are_counted_through_comments_and_every_line_end),
         cmocka_unit_test(decimal_commas_are_refused),
+        cmocka_unit_test(what_may_be_the_end_of_a_decimal_comma_is_refused),
         cmocka_unit_test(what_is_not_finite_is_refused),
         cmocka_unit_test(huge_and_tiny_numbers_that_a_double_holds_are_kept),
         cmocka_unit_test(what_is_no_number_is_refused_with_its_place),
