@@ -2,9 +2,11 @@
 #include "base/control.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <poll.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -17,8 +19,12 @@ enum {
     REPLY_MOST = 1 << 26,
     CHUNK = 1 << 16,
     CLIENTS_MOST = 16,
-    REST_MS = 100
+    LOCK_TRIES = 8,
+    REST_MS = 100,
+    LOCK_PATH = sizeof((struct sockaddr_un *)0)->sun_path + sizeof ".lock"
 };
+
+static const int64_t IDLE_NS = 10 * NS_PER_S;
 
 // Bytes waiting to be parsed or sent.
 struct bytes {
@@ -269,12 +275,14 @@ struct caller {
     bool ended;
     bool answered;    // late: lines that came meanwhile are to be looked at
     uint64_t awaited; // ticket of the answer to come, 0 = none
+    int64_t moved_ns; // when it last came, asked or was answered
     struct bytes in, out;
 };
 
 struct control_server {
     int fd;
     bool resting; // accept failed: leave the queue alone for one round
+    int64_t idle_ns; // after which a place may be taken from its client
     bool crowded; // the last round ended with every place taken and somebody waiting
     struct sockaddr_un address;
     dev_t device;
@@ -310,7 +318,35 @@ static bool clear_stale(const struct sockaddr_un *address, struct error *err)
     return !unlink(path) || fail_errno(err, "%s: cannot be replaced", path);
 }
 
-static bool open_server(struct control_server *server, struct error *err)
+// Holds PATH.lock while the socket is looked at and made, so that of two
+// servers that start at once one sees the other. The file goes with the lock;
+// who waited for one that is gone by then begins again. -1 with err.
+static int lock_path(const char *path, char lock[LOCK_PATH], struct error *err)
+{
+    struct stat held, there;
+    snprintf(lock, LOCK_PATH, "%s.lock", path);
+    for (int i = 0; i < LOCK_TRIES; i++) {
+        int fd = open(lock, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
+        if (fd < 0) {
+            fail(err, errno == ENOENT ? ERROR_CONFIG : ERROR_SYSTEM, "%s: cannot listen: %s", path,
+                 strerror(errno));
+            return -1;
+        }
+        if (flock(fd, LOCK_EX | LOCK_NB)) {
+            close(fd);
+            fail(err, ERROR_CONFIG, "%s: somebody else begins to listen there", path);
+            return -1;
+        }
+        if (!fstat(fd, &held) && !lstat(lock, &there) && held.st_ino == there.st_ino &&
+            held.st_dev == there.st_dev)
+            return fd;
+        close(fd);
+    }
+    fail(err, ERROR_RETRY, "%s: others begin to listen there again and again", path);
+    return -1;
+}
+
+static bool make_socket(struct control_server *server, struct error *err)
 {
     const char *path = server->address.sun_path;
     if (!clear_stale(&server->address, err))
@@ -329,6 +365,18 @@ static bool open_server(struct control_server *server, struct error *err)
     return true;
 }
 
+static bool open_server(struct control_server *server, struct error *err)
+{
+    char lock[LOCK_PATH];
+    int held = lock_path(server->address.sun_path, lock, err);
+    if (held < 0)
+        return false;
+    bool fine = make_socket(server, err);
+    unlink(lock);
+    close(held);
+    return fine;
+}
+
 struct control_server *control_listen(const char *path, struct error *err)
 {
     struct sockaddr_un address;
@@ -339,7 +387,7 @@ struct control_server *control_listen(const char *path, struct error *err)
         fail_errno(err, "%s", path);
         return NULL;
     }
-    *server = (struct control_server){.fd = -1, .address = address};
+    *server = (struct control_server){.fd = -1, .idle_ns = IDLE_NS, .address = address};
     for (int i = 0; i < CLIENTS_MOST; i++)
         server->callers[i].fd = -1;
     if (open_server(server, err))
@@ -420,8 +468,10 @@ static bool flush(struct caller *caller)
         else
             ok = errno == EINTR;
     }
-    if (sent)
+    if (sent) {
         bytes_drop(&caller->out, sent);
+        caller->moved_ns = clock_now_ns();
+    }
     return ok;
 }
 
@@ -430,8 +480,10 @@ static bool read_more(struct caller *caller)
     if (!bytes_reserve(&caller->in, CHUNK))
         return false;
     ssize_t n = recv(caller->fd, caller->in.text + caller->in.used, CHUNK, MSG_DONTWAIT);
-    if (n > 0)
+    if (n > 0) {
         caller->in.used += n;
+        caller->moved_ns = clock_now_ns();
+    }
     caller->ended = !n;
     return n >= 0 || errno == EAGAIN || errno == EINTR;
 }
@@ -485,6 +537,7 @@ void control_answer(struct control_server *server, uint64_t ticket, json_t *repl
     }
     caller->awaited = 0;
     caller->answered = true;
+    caller->moved_ns = clock_now_ns();
     if (reply && json_object_set_new(reply, "ok", json_true())) {
         json_decref(reply);
         reply = NULL;
@@ -501,12 +554,32 @@ static void turn_away(int fd)
     close(fd);
 }
 
+void control_idle_after(struct control_server *server, int64_t idle_ns)
+{
+    server->idle_ns = idle_ns;
+}
+
 static struct caller *free_place(struct control_server *server)
 {
     for (int i = 0; i < CLIENTS_MOST; i++)
         if (server->callers[i].fd < 0)
             return &server->callers[i];
     return NULL;
+}
+
+// The place of who has been idle longest, when that is too long; or NULL.
+static struct caller *idle_place(struct control_server *server)
+{
+    struct caller *idle = NULL;
+    for (int i = 0; i < CLIENTS_MOST; i++) {
+        struct caller *caller = &server->callers[i];
+        if (!caller->awaited && (!idle || caller->moved_ns < idle->moved_ns))
+            idle = caller;
+    }
+    if (!idle || clock_now_ns() - idle->moved_ns < server->idle_ns)
+        return NULL;
+    hang_up(idle);
+    return idle;
 }
 
 // Nobody is turned away before a whole round found every place still taken:
@@ -524,9 +597,11 @@ static void accept_callers(struct control_server *server)
             server->resting = errno != EAGAIN && errno != EINTR && errno != ECONNABORTED;
             return;
         }
+        if (!caller)
+            caller = idle_place(server);
         server->crowded = !caller;
         if (caller)
-            caller->fd = fd;
+            *caller = (struct caller){.fd = fd, .moved_ns = clock_now_ns()};
         else
             turn_away(fd);
     }

@@ -59,10 +59,14 @@ struct control_server;
 
 // Listens at path (an old socket file that nobody serves is replaced; mode
 // 0600); a plain file or a served socket there is left alone (CONFIG). At most
-// 16 clients, one more is told RETRY; a line longer than 1 MiB ends its
+// 16 clients; one more takes the place of the one that has been idle longest,
+// when that is 10 s, else it is told RETRY; a line longer than 1 MiB ends its
 // connection; a line that is no request is answered with DATA.
 struct control_server *control_listen(const char *path, struct error *err);
 void control_unlisten(struct control_server *server);
+
+// How long a client may be idle while others wait for a place, instead of 10 s.
+void control_idle_after(struct control_server *server, int64_t idle_ns);
 
 // Waits at most timeout_ms for input, answers every complete line, returns.
 // False only when polling itself fails.

@@ -26,7 +26,7 @@ enum error_code {
 // function overwrites it. May be NULL wherever a function takes one.
 struct error {
     enum error_code code;
-    char text[512]; // one line, no newline, cut at the end if longer
+    char text[512]; // one line without control characters ('?'), cut at the end if longer
 };
 
 // Fills err (when not NULL) with a printf-style text. Always returns false, so
@@ -40,6 +40,11 @@ bool fail_errno(struct error *err, const char *format, ...) __attribute__((forma
 // Puts context before the text of a filled err: "context: text". Keeps the
 // code. Always returns false.
 bool while_doing(struct error *err, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+// What a program ends with after this error, one rule for all of them: 2 when a
+// setting, an input file or an argument must be corrected (CONFIG, DATA,
+// RANGE), else 1.
+int error_exit_code(const struct error *err);
 
 // The lower-case name of a code, such as "retry". Never NULL.
 const char *error_code_name(enum error_code code);

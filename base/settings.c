@@ -35,13 +35,17 @@ static bool refuse(const struct setting *row, const char *text, int size, const 
                 row->unit);
 }
 
-static bool number(const struct setting *row, const char **text, double *value, struct error *err)
+// alone: nothing may follow it.
+static bool number(const struct setting *row, const char **text, bool alone, double *value,
+                   struct error *err)
 {
-    char *end;
-    *value = strtod(*text, &end);
-    bool apart = !*end || *end == ' ' || *end == '\t';
-    if (end == *text || !isfinite(*value) || !apart)
+    const char *end;
+    bool one = number_parse(*text, &end, value);
+    bool apart = one && (!*end || *end == ' ' || *end == '\t');
+    if (!apart)
         return refuse(row, *text, (int)strlen(*text), "is not a number", err);
+    if (alone && end[strspn(end, " \t")])
+        return refuse(row, *text, (int)strlen(*text), "is not one number", err);
     if (*value < row->least || *value > row->most)
         return fail(err, ERROR_CONFIG, "%s: %.*s is outside %.15g..%.15g%s%s", row->name,
                     (int)(end - *text), *text, row->least, row->most, *row->unit ? " " : "",
@@ -54,9 +58,9 @@ static bool whole(const struct setting *row, const char *text, int *value, struc
 {
     const char *rest = text;
     double x;
-    if (!number(row, &rest, &x, err))
+    if (!number(row, &rest, true, &x, err))
         return false;
-    if (*rest || x != rint(x))
+    if (x != rint(x))
         return refuse(row, text, (int)strlen(text), "is not a whole number", err);
     *value = (int)x;
     return true;
@@ -85,14 +89,14 @@ static bool vector(const struct setting *row, const char *text, double *values, 
         if (!*rest)
             return fail(err, ERROR_CONFIG, "%s: \"%.80s\" has %zu numbers instead of %zu",
                         row->name, text, i, row->size);
-        if (!number(row, &rest, &x, err))
+        if (!number(row, &rest, false, &x, err))
             return false;
     }
     if (*rest)
         return fail(err, ERROR_CONFIG, "%s: \"%.80s\" is not %zu numbers with blanks between",
                     row->name, text, row->size);
     for (size_t i = 0; i < row->size; i++)
-        number(row, &text, &values[i], NULL);
+        number(row, &text, false, &values[i], NULL);
     return true;
 }
 
@@ -108,10 +112,8 @@ bool settings_set(const struct setting *rows, void *target, const char *name, co
     int i;
     switch (row->type) {
     case SETTING_DOUBLE:
-        if (!number(row, &rest, &x, err))
+        if (!number(row, &rest, true, &x, err))
             return false;
-        if (*rest)
-            return refuse(row, text, (int)strlen(text), "is not one number", err);
         *(double *)field = x;
         return true;
     case SETTING_INT:

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "calibration/commands.h"
+#include "files/write.h"
 
 static const struct command FAMILIES[] = {
     {"colour", command_colour, "deltae|spectrum", "colour differences; colours of spectra"},
@@ -16,11 +17,12 @@ static const struct command FAMILIES[] = {
 
 int main(int argc, char **argv)
 {
-    if (argc == 2 && !strcmp(argv[1], "--version")) {
+    int code = COMMAND_FINE;
+    files_take_pipes();
+    if (argc == 2 && !strcmp(argv[1], "--version"))
         printf("boothcal %s\n", BOOTHD_VERSION);
-        return COMMAND_FINE;
-    }
-    int code = command_run("boothcal", FAMILIES, argc, argv);
+    else
+        code = command_run("boothcal", FAMILIES, argc, argv);
     if (argc >= 2 && (!strcmp(argv[1], "--help") || !strcmp(argv[1], "-h")))
         printf("  boothcal --version\n  boothcal FAMILY --help\n");
     if (fflush(stdout) || ferror(stdout)) {

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/number.h"
 #include "colorimetry/tables/tables.h"
 
 #define C2_M_K 1.4388e-2
@@ -42,11 +43,9 @@ static bool unknown(const char *name, struct error *err)
 // "D5500K": the number between the letters.
 static bool kelvin_of(const char *name, double *kelvin)
 {
-    char *end;
-    if (name[1] < '0' || name[1] > '9')
-        return false;
-    *kelvin = strtod(name + 1, &end);
-    return strcmp(end, "K") == 0 && isfinite(*kelvin);
+    const char *end;
+    return name[1] >= '0' && name[1] <= '9' && number_parse(name + 1, &end, kelvin) &&
+           strcmp(end, "K") == 0;
 }
 
 // ISO/CIE 11664-2: A by its own formula.

@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/number.h"
 #include "base/settings.h"
 #include "config/paths.h"
 #include "config/spectra.h"
@@ -56,14 +57,14 @@ static bool reflectances_load(const char *path, struct spectra *out, struct erro
 // Index of the background among the spectra; a number is added as a grey.
 static bool background(struct spectra *s, const char *text, int *index, struct error *err)
 {
-    char *end;
+    const char *end;
+    double value;
     for (int i = 0; i < s->count; i++)
         if (!strcmp(s->names[i], text)) {
             *index = i;
             return true;
         }
-    double value = strtod(text, &end);
-    if (end == text || *end || !(value >= 0 && value <= 1))
+    if (!number_parse(text, &end, &value) || *end || !(value >= 0 && value <= 1))
         return fail(err, ERROR_CONFIG,
                     "background: \"%s\" is neither a spectrum of the source nor a reflectance "
                     "0..1",

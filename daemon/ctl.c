@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/control.h"
+#include "base/number.h"
 #include "config/paths.h"
 
 const char ctl_help[] =
@@ -61,9 +62,8 @@ struct words {
 static bool number(const char *name, const char *text, double least, double most, double *out,
                    struct error *err)
 {
-    char *end;
-    *out = strtod(text, &end);
-    if (end == text || *end || !(*out >= least && *out <= most))
+    const char *end;
+    if (!number_parse(text, &end, out) || *end || !(*out >= least && *out <= most))
         return fail(err, ERROR_RANGE, "%s: \"%s\" is not a number in %g..%g", name, text, least,
                     most);
     return true;

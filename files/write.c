@@ -102,6 +102,32 @@ bool whole_file_write(const char *path, const void *bytes, size_t size, struct e
     return whole_file_commit(&file, err);
 }
 
+static bool pipes_too; // written before any thread
+
+void files_take_pipes(void)
+{
+    pipes_too = true;
+}
+
+static FILE *open_to_read(const char *path, struct error *err)
+{
+    struct stat what;
+    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NOCTTY | (pipes_too ? 0 : O_NONBLOCK));
+    bool there = fd >= 0 && !fstat(fd, &what);
+    FILE *stream = NULL;
+    if (there && S_ISDIR(what.st_mode))
+        there = false, errno = EISDIR;
+    if (!there)
+        fail(err, ERROR_CONFIG, "%s: cannot be read: %s", path, strerror(errno));
+    else if (!pipes_too && !S_ISREG(what.st_mode))
+        fail(err, ERROR_CONFIG, "%s: is no regular file", path);
+    else if (!(stream = fdopen(fd, "rb")))
+        fail_errno(err, "%s: cannot be read", path);
+    if (!stream && fd >= 0)
+        close(fd);
+    return stream;
+}
+
 static char *read_stream(FILE *stream, size_t most, size_t *size)
 {
     size_t room = 65536, used = 0;
@@ -122,11 +148,9 @@ static char *read_stream(FILE *stream, size_t most, size_t *size)
 
 char *file_read(const char *path, size_t most, size_t *size, struct error *err)
 {
-    FILE *stream = fopen(path, "rbe");
-    if (!stream) {
-        fail_errno(err, "%s: cannot be read", path);
+    FILE *stream = open_to_read(path, err);
+    if (!stream)
         return NULL;
-    }
     char *bytes = read_stream(stream, most, size);
     bool bad = ferror(stream);
     if (!bytes || bad)

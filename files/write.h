@@ -28,8 +28,15 @@ void whole_file_abandon(struct whole_file *file);
 // Both steps for bytes at hand.
 bool whole_file_write(const char *path, const void *bytes, size_t size, struct error *err);
 
-// Reads a whole file into malloc'd memory, NUL-terminated beyond *size.
-// NULL with err (SYSTEM; DATA beyond most bytes).
+// Reads a whole file into malloc'd memory, NUL-terminated beyond *size. Only a
+// regular file: a pipe could keep its reader waiting for ever. NULL with err
+// (CONFIG when there is no such file or it may not be read; DATA beyond most
+// bytes; SYSTEM).
 char *file_read(const char *path, size_t most, size_t *size, struct error *err);
+
+// From now on file_read takes pipes and devices too, and waits for them: for a
+// program at whose command line somebody may write <(…) or /dev/stdin. To be
+// called at its start, before any thread.
+void files_take_pipes(void);
 
 #endif

@@ -499,6 +499,37 @@ static void nobody_is_turned_away_for_clients_that_have_gone(void **state)
     rmdir(s.folder);
 }
 
+static void who_has_been_idle_too_long_makes_room_for_who_asks(void **state)
+{
+    (void)state;
+    char line[256] = "";
+    struct stage s;
+    int idle[16], fd;
+    listen_unserved(&s);
+    for (int i = 0; i < 16; i++) {
+        idle[i] = raw_connect(s.path);
+        assert_true(control_serve(s.server, 0, handle, &s, NULL));
+    }
+    assert_true(raw_send(idle[0], "{\"do\":\"echo\",\"value\":0}\n", 24)); // no longer the idlest
+    control_idle_after(s.server, 0);
+    fd = raw_connect(s.path);
+    assert_true(raw_send(fd, "{\"do\":\"echo\",\"value\":1}\n", 24));
+    for (int i = 0; i < 4; i++)
+        assert_true(control_serve(s.server, 0, handle, &s, NULL));
+    assert_true(raw_line(fd, line, sizeof line) > 0);
+    assert_string_equal(line, "{\"value\":1,\"ok\":true}");
+    assert_true(raw_line(idle[0], line, sizeof line) > 0);
+    assert_string_equal(line, "{\"value\":0,\"ok\":true}");
+    char byte;
+    assert_int_equal(recv(idle[1], &byte, 1, MSG_DONTWAIT), 0);  // hung up
+    assert_int_equal(recv(idle[2], &byte, 1, MSG_DONTWAIT), -1); // still there
+    for (int i = 0; i < 16; i++)
+        close(idle[i]);
+    close(fd);
+    control_unlisten(s.server);
+    rmdir(s.folder);
+}
+
 int main(void)
 {
 #define staged(test) cmocka_unit_test_setup_teardown(test, open_stage, close_stage)
@@ -524,6 +555,7 @@ int main(void)
         staged(a_socket_that_is_served_and_a_plain_file_are_left_alone),
         cmocka_unit_test(the_reply_to_a_call_that_timed_out_is_not_taken_for_the_next),
         cmocka_unit_test(nobody_is_turned_away_for_clients_that_have_gone),
+        cmocka_unit_test(who_has_been_idle_too_long_makes_room_for_who_asks),
     };
     return cmocka_run_group_tests_name("control", tests, NULL, NULL);
 }

@@ -9,6 +9,8 @@
 #include <cmocka.h>
 #undef fail // ours is a function
 
+#include <pthread.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
@@ -41,6 +43,54 @@ static void a_socket_file_that_nobody_serves_is_replaced(void **state)
     control_unlisten(server);
     assert_int_equal(access(path, F_OK), -1);
     rmdir(folder);
+}
+
+struct racer {
+    char path[64];
+    pthread_barrier_t *start;
+    struct control_server *server;
+};
+
+static void *race(void *argument)
+{
+    struct racer *r = argument;
+    pthread_barrier_wait(r->start);
+    r->server = control_listen(r->path, NULL);
+    return NULL;
+}
+
+// Each may see the stale socket; only one may put its own there.
+static void of_servers_that_start_at_once_one_at_most_listens(void **state)
+{
+    (void)state;
+    enum { RACERS = 4, RACES = 50 };
+    char folder[] = "/tmp/control-XXXXXX";
+    pthread_barrier_t start;
+    assert_non_null(mkdtemp(folder));
+    pthread_barrier_init(&start, NULL, RACERS);
+    for (int n = 0; n < RACES; n++) {
+        struct racer racers[RACERS];
+        pthread_t threads[RACERS];
+        struct sockaddr_un address = {.sun_family = AF_UNIX};
+        snprintf(address.sun_path, sizeof address.sun_path, "%s/s", folder);
+        int fd = socket(AF_UNIX, SOCK_STREAM, 0), listening = 0;
+        assert_int_equal(bind(fd, (struct sockaddr *)&address, sizeof address), 0);
+        close(fd);
+        for (int i = 0; i < RACERS; i++) {
+            racers[i] = (struct racer){.start = &start};
+            strcpy(racers[i].path, address.sun_path);
+            assert_int_equal(pthread_create(&threads[i], NULL, race, &racers[i]), 0);
+        }
+        for (int i = 0; i < RACERS; i++) {
+            pthread_join(threads[i], NULL);
+            listening += racers[i].server != NULL;
+        }
+        assert_int_equal(listening, 1);
+        for (int i = 0; i < RACERS; i++)
+            control_unlisten(racers[i].server);
+    }
+    pthread_barrier_destroy(&start);
+    assert_int_equal(rmdir(folder), 0); // neither socket nor lock is left
 }
 
 static void a_server_does_not_remove_the_socket_of_its_successor(void **state)
@@ -107,6 +157,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_socket_file_that_nobody_serves_is_replaced),
+        cmocka_unit_test(of_servers_that_start_at_once_one_at_most_listens),
         cmocka_unit_test(a_server_does_not_remove_the_socket_of_its_successor),
         cmocka_unit_test(calling_where_nobody_listens_is_gone),
         cmocka_unit_test(answers_that_are_no_replies_are_data_errors),

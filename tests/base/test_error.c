@@ -133,6 +133,41 @@ static size_t logged(enum log_level level, char *text, size_t room)
     return size;
 }
 
+static void what_others_wrote_cannot_command_the_terminal(void **state)
+{
+    (void)state;
+    struct error err = {0};
+    fail(&err, ERROR_CONFIG, "no material \"%s\"", "a\nb\x1b[31mc\r\x7f\xc2\x9b, caf\xc3\xa9");
+    assert_string_equal(err.text, "no material \"a b?[31mc????, caf\xc3\xa9\"");
+    while_doing(&err, "showing\x07");
+    assert_string_equal(err.text, "showing?: no material \"a b?[31mc????, caf\xc3\xa9\"");
+}
+
+static void what_can_be_corrected_ends_a_program_with_2(void **state)
+{
+    (void)state;
+    static const enum error_code bad_input[] = {ERROR_DATA, ERROR_RANGE, ERROR_CONFIG};
+    static const enum error_code failed[] = {ERROR_RETRY, ERROR_GONE, ERROR_SYSTEM};
+    for (int i = 0; i < 3; i++) {
+        assert_int_equal(error_exit_code(&(struct error){.code = bad_input[i]}), 2);
+        assert_int_equal(error_exit_code(&(struct error){.code = failed[i]}), 1);
+    }
+}
+
+static void a_number_is_decimal_and_finite(void **state)
+{
+    (void)state;
+    static const char *const bad[] = {"", "x", " 1", "0x10", "nan", "inf", "1e999", "-"};
+    const char *end;
+    double value = 7;
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+        assert_false(number_parse(bad[i], &end, &value));
+    assert_true(value == 7);
+    assert_true(number_parse("-1.5e2K", &end, &value));
+    assert_true(value == -150);
+    assert_string_equal(end, "K");
+}
+
 static void a_log_line_names_the_program_or_gives_the_journal_its_level(void **state)
 {
     (void)state;
@@ -159,6 +194,9 @@ int main(void)
         cmocka_unit_test(every_code_has_its_name),
         cmocka_unit_test(a_number_as_text_is_short_and_exact),
         cmocka_unit_test(the_clock_never_goes_back_and_sleeps_to_its_deadline),
+        cmocka_unit_test(what_others_wrote_cannot_command_the_terminal),
+        cmocka_unit_test(what_can_be_corrected_ends_a_program_with_2),
+        cmocka_unit_test(a_number_is_decimal_and_finite),
         cmocka_unit_test(a_log_line_names_the_program_or_gives_the_journal_its_level),
     };
     return cmocka_run_group_tests_name("error", tests, NULL, NULL);

@@ -100,6 +100,10 @@ static void what_is_no_number_is_refused_and_says_what_is_allowed(void **state)
     assert_refused("width_m", "0,5", "width_m: \"0,5\" is not a number; allowed: 0.01..10 m");
     assert_refused("width_m", "0.5m", "width_m: \"0.5m\" is not a number; allowed: 0.01..10 m");
     assert_refused("width_m", "0.5 m", "width_m: \"0.5 m\" is not one number; allowed: 0.01..10 m");
+    assert_refused("width_m", "520 mm", "width_m: \"520 mm\" is not one number; allowed: 0.01..10 m");
+    assert_refused("width_m", "0x1", "width_m: \"0x1\" is not a number; allowed: 0.01..10 m");
+    assert_refused("integration_us", "0x10000",
+                   "integration_us: \"0x10000\" is not a number; allowed: 1000..65535000 us");
     assert_refused("integration_us", "1000.5",
                    "integration_us: \"1000.5\" is not a whole number; allowed: 1000..65535000 us");
 }

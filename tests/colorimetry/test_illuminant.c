@@ -243,6 +243,7 @@ static void temperatures_in_names_are_read(void **state)
     assert_true(illuminant("D5500.5K", &named, NULL));
     assert_true(daylight(5500.5, &made, NULL));
     assert_memory_equal(&named, &made, sizeof made);
+    assert_false(illuminant("D0x1500K", &named, NULL)); // decimal only
 }
 
 int main(void)

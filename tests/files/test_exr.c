@@ -412,7 +412,7 @@ static void what_is_no_image_is_refused(void **state)
     assert_false(exr_load(put_text("t.exr", ""), &image, &err));
     assert_int_equal(err.code, ERROR_DATA);
     assert_false(exr_load(at("none.exr"), &image, &err));
-    assert_int_equal(err.code, ERROR_SYSTEM);
+    assert_int_equal(err.code, ERROR_CONFIG);
     assert_complaint(err.text, "none.exr: cannot be read: No such file or directory");
 }
 

@@ -229,7 +229,7 @@ static void a_missing_file_is_named(void **state)
     struct error err = {0};
     struct settings_section sections[] = {{"screen", SCREEN, &both.screen}, {0}};
     assert_false(ini_load(at("none.ini"), sections, &err));
-    assert_int_equal(err.code, ERROR_SYSTEM);
+    assert_int_equal(err.code, ERROR_CONFIG);
     assert_complaint(err.text, "none.ini: cannot be read: No such file or directory");
 }
 

@@ -240,6 +240,33 @@ static void a_file_is_read_whole_up_to_its_bound(void **state)
     unlink(at("a"));
 }
 
+static void a_pipe_is_refused_at_once_until_a_program_takes_pipes(void **state)
+{
+    (void)state;
+    struct error err = {0};
+    size_t size;
+    int ends[2];
+    char path[32];
+    assert_int_equal(mkfifo(at("pipe"), 0600), 0);
+    assert_null(file_read(at("pipe"), 10, &size, &err)); // nobody will ever write into it
+    assert_int_equal(err.code, ERROR_CONFIG);
+    assert_complaint(err.text, "pipe: is no regular file");
+    unlink(at("pipe"));
+    assert_null(file_read("/dev/zero", 10, &size, &err));
+    assert_int_equal(err.code, ERROR_CONFIG);
+    assert_int_equal(pipe(ends), 0);
+    assert_int_equal(write(ends[1], "words", 5), 5);
+    close(ends[1]);
+    snprintf(path, sizeof path, "/dev/fd/%d", ends[0]);
+    assert_null(file_read(path, 10, &size, &err));
+    files_take_pipes();
+    char *words = file_read(path, 10, &size, &err);
+    assert_non_null(words);
+    assert_string_equal(words, "words");
+    free(words);
+    close(ends[0]);
+}
+
 static void a_picture_comes_back_as_the_same_counts(void **state)
 {
     (void)state;
@@ -282,6 +309,7 @@ int main(void)
         cmocka_unit_test(a_full_disk_leaves_the_old_file_and_no_other),
         cmocka_unit_test(every_writer_leaves_the_old_file_when_the_disk_is_full),
         cmocka_unit_test(a_file_is_read_whole_up_to_its_bound),
+        cmocka_unit_test(a_pipe_is_refused_at_once_until_a_program_takes_pipes),
         cmocka_unit_test(a_picture_comes_back_as_the_same_counts),
         cmocka_unit_test(a_picture_of_no_size_is_refused),
     };
