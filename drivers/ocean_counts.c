@@ -21,6 +21,7 @@ static const double full_scale = 65535;
 static const double well_electrons = 160000;
 static const double read_noise = 50; // scaled counts RMS
 static const double aim = 0.85, lowest = 0.78, highest = 0.92;
+static const double upward = 0.88; // below highest by more than noise: no hunting between two steps
 
 // The text may fill all 15 bytes without a NUL, and junk follows a NUL.
 static void slot_text(const uint8_t reply[OCEAN_SLOT_BYTES], char text[16])
@@ -300,7 +301,7 @@ int ocean_next_exposure(int us, double peak, double dark, int saturated, double 
     double gain = peak > dark ? fmin((aim - dark) / (peak - dark), 8) : 8;
     int next = ocean_round_exposure(us * gain, mains_hz, longest_us);
     int more = ocean_round_exposure(next + 0.5e6 / mains_hz, mains_hz, longest_us);
-    if (us * gain >= 0.5e6 / mains_hz && dark + (peak - dark) * more / us <= highest)
+    if (us * gain >= 0.5e6 / mains_hz && dark + (peak - dark) * more / us <= upward)
         next = more;
     return next;
 }

@@ -88,7 +88,8 @@ void ocean_irradiance(const struct ocean_unit *unit, const struct ocean_axis *ax
 // The exposure to try after one of us that gave peak and dark (over
 // saturation, 0..1): towards 85 % of saturation, us itself within 78..92 %, at
 // most 8 times up; after saturation a quarter, or a sixteenth when more than
-// 200 pixels were saturated. From half a mains period on, its multiples.
+// 200 pixels were saturated. From half a mains period on, its multiples; where
+// none of them falls between 78 and 92 %, the longest that stays below 88 %.
 // Always within 1000..longest_us.
 int ocean_next_exposure(int us, double peak, double dark, int saturated, double mains_hz,
                         int longest_us);

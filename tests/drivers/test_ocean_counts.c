@@ -395,6 +395,22 @@ static void exposure_settles_from_anywhere_without_swinging(void **state)
     }
 }
 
+// Light between two allowed exposures, with 1 % of noise on its peak.
+static void noise_does_not_make_the_exposure_hunt(void **state)
+{
+    (void)state;
+    for (double rate = 1e-6; rate < 9e-5; rate *= 1.03) {
+        int us = 100000, changes = 0;
+        for (int reading = 0; reading < 300; reading++) {
+            double peak = 0.05 + rate * us * (1 + 0.01 * sin(reading * 12.9898));
+            int next = ocean_next_exposure(us, fmin(peak, 1), 0.05, peak >= 1 ? 1 : 0, 50, 1000000);
+            changes += reading >= 10 && next != us;
+            us = next;
+        }
+        assert_true(changes <= 1);
+    }
+}
+
 static const char real_unit[] = "../shared/data/spectrometer/FLMS04133.tsv";
 static const double file_digits = 1e-4; // nm; the vendor's coefficients are rounded
 
@@ -457,6 +473,7 @@ int main(void)
         cmocka_unit_test(exposure_steps_are_bounded),
         cmocka_unit_test(exposures_from_half_a_mains_period_on_are_its_multiples),
         cmocka_unit_test(exposure_settles_from_anywhere_without_swinging),
+        cmocka_unit_test(noise_does_not_make_the_exposure_hunt),
         cmocka_unit_test(a_real_units_pixels_lie_where_its_vendor_says),
         cmocka_unit_test(a_spectrometer_that_is_not_there_is_gone),
     };
