@@ -281,9 +281,9 @@ struct caller {
 
 struct control_server {
     int fd;
-    bool resting; // accept failed: leave the queue alone for one round
+    bool resting;    // accept failed: leave the queue alone for one round
     int64_t idle_ns; // after which a place may be taken from its client
-    bool crowded; // the last round ended with every place taken and somebody waiting
+    bool crowded;    // the last round ended with every place taken and somebody waiting
     struct sockaddr_un address;
     dev_t device;
     ino_t inode;

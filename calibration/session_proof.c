@@ -6,6 +6,7 @@
 #include "base/clock.h"
 #include "calibration/proof.h"
 #include "calibration/session.h"
+#include "config/bands_file.h"
 #include "config/materials.h"
 
 enum { SETTLE_ATTEMPTS = 20, LOOKS = 5 };
@@ -44,12 +45,12 @@ static bool references(struct session *s, const struct lamp_report *lamp,
                           : predicted(s, lamp, reflectances, count, out, err);
 }
 
-static bool simulate(struct lamp_report *lamp, const struct material *chart, int bands,
+static bool simulate(struct lamp_report *lamp, const struct material *chart, const char *bands,
                      struct error *err)
 {
     struct band_set set;
     struct band_matrix matrix;
-    if (!band_set_shipped(bands, &set, err) ||
+    if (!bands_named(bands, &set, err) ||
         !band_matrix_adapted(&set, &lamp->irradiance, OBSERVER_1931_2, &matrix, err))
         return false;
     lamp->white_taught = xyz_relative(&lamp->irradiance, NULL, OBSERVER_1931_2);

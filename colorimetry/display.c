@@ -3,7 +3,6 @@
 
 #include <math.h>
 
-static const double GAMUT_TOLERANCE = 1e-9;
 static const double CONDITION_MOST = 50;
 static const double SLOPE_LEAST = 1e-6;
 
@@ -130,9 +129,9 @@ struct display_inverse display_invert(const struct display_model *model, struct 
                    display_count(model->curve[1], linear.g),
                    display_count(model->curve[2], linear.b)},
         .linear = linear,
-        .in_gamut = !display_outside(linear.r, GAMUT_TOLERANCE) &&
-                    !display_outside(linear.g, GAMUT_TOLERANCE) &&
-                    !display_outside(linear.b, GAMUT_TOLERANCE),
+        .in_gamut = !display_outside(linear.r, DISPLAY_GAMUT_TOLERANCE) &&
+                    !display_outside(linear.g, DISPLAY_GAMUT_TOLERANCE) &&
+                    !display_outside(linear.b, DISPLAY_GAMUT_TOLERANCE),
     };
 }
 

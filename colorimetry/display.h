@@ -11,6 +11,10 @@
 // Nodes stand at k/1020, so that every 8-bit code is a node.
 enum { DISPLAY_NODES = 1021 };
 
+// In linear light: what is outside 0..1 by no more than this is in gamut. Below
+// it the GPU's single precision cannot tell.
+#define DISPLAY_GAMUT_TOLERANCE 1e-6
+
 // Digital counts as fractions of full code, 0..1.
 struct counts {
     double r, g, b;
@@ -42,7 +46,7 @@ struct xyz display_forward(const struct display_model *model, struct counts coun
 struct display_inverse {
     struct counts counts; // clamped to 0..1
     struct counts linear; // before clamping: < 0 or > 1 where out of gamut
-    bool in_gamut;        // decided on linear with a tolerance of 1e-9, before clamping
+    bool in_gamut;        // decided on linear with DISPLAY_GAMUT_TOLERANCE
 };
 
 // XYZ in cd/m2 to counts by the inverse matrix and a search of each curve.

@@ -98,11 +98,11 @@ static const struct setting materials_rows[] = {
 
 static const struct setting quality_rows[] = {
     {"observer", SETTING_ENUM, AT(quality.observer), 0, 0, 0, "", observer_names, "1931-2",
-     "Colour-matching functions."},
+     "Colour-matching functions; only 1931-2, which display model and luminance stand on."},
     {"spectral", SETTING_ENUM, AT(quality.spectral), 0, 0, 0, "", spectral_names, "auto",
      "How surface meets lamp: full spectra where known (auto), bands, product, full."},
-    {"bands", SETTING_INT, AT(quality.bands), 0, BANDS_LEAST, BANDS_MOST, "", NULL, "6",
-     "Number of spectral bands."},
+    {"bands", SETTING_TEXT, AT(quality.bands), ROOM(quality.bands), 0, 0, "", NULL, "6",
+     "Spectral bands: how many, 3..16, or a file of 'boothcal bands optimise'."},
     {"lights", SETTING_INT, AT(quality.lights), 0, 1, 4096, "", NULL, "128",
      "Light points that stand for the ceiling."},
     {"cut", SETTING_ENUM, AT(quality.cut), 0, 0, 0, "", cut_names, "variance",
@@ -120,6 +120,8 @@ static const struct setting state_rows[] = {
      "Time constant over which the lamp's level is smoothed."},
     {"tilt_s", SETTING_DOUBLE, AT(state.tilt_s), 0, 0, 10, "s", NULL, "0.2",
      "Time constant over which a resting tilt is smoothed."},
+    {"eye_s", SETTING_DOUBLE, AT(state.eye_s), 0, 0, 10, "s", NULL, "0.1",
+     "Time constant over which the place of a resting eye is smoothed."},
     {"dark_lux", SETTING_DOUBLE, AT(state.dark_lux), 0, 0, 1000, "lx", NULL, "5",
      "Illuminance below which no lamp is on."},
     {"lamp_distance", SETTING_DOUBLE, AT(state.lamp_distance), 0, 0.001, 1, "", NULL, "0.01",

@@ -26,6 +26,7 @@ struct state_settings {
     double eye_hold_s;    // 0..3600
     double level_s;       // 0..60: time constant of the lamp's level
     double tilt_s;        // 0..10: time constant of the tilt
+    double eye_s;         // 0..10: time constant of the eye
     double dark_lux;      // 0..1000: below it no lamp is on
     double lamp_distance; // 0.001..1: greatest shape distance of a known lamp
     int confirmations;    // 1..20: equal readings before another lamp is believed
@@ -80,11 +81,11 @@ struct booth_settings {
         char show[512]; // material shown at the start, "" = none
     } materials;
     struct {
-        int observer; // enum observer
-        int spectral; // enum spectral_mode
-        int bands;    // BANDS_LEAST..BANDS_MOST
-        int lights;   // 1..4096
-        int cut;      // enum median_cut
+        int observer;    // enum observer; only OBSERVER_1931_2 is loaded
+        int spectral;    // enum spectral_mode
+        char bands[512]; // count or file, see booth_bands
+        int lights;      // 1..4096
+        int cut;         // enum median_cut
     } quality;
     struct state_settings state;
     struct {
@@ -126,6 +127,9 @@ const struct spectrometer_driver *booth_spectrometer(const struct booth_settings
 const struct accelerometer_driver *booth_accelerometer(const struct booth_settings *booth);
 const struct tracker_driver *booth_tracker(const struct booth_settings *booth);
 const struct radiometer_driver *booth_radiometer(const struct booth_settings *booth);
+
+// The bands that the settings name. Errors name file, key, value.
+bool booth_bands(const struct booth_settings *booth, struct band_set *out, struct error *err);
 
 // Bits per channel of the display's input: 8 or 10.
 int booth_bits(const struct booth_settings *booth);

@@ -2,6 +2,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "config/bands_file.h"
 #include "config/booth.h"
 #include "config/paths.h"
 #include "files/ini.h"
@@ -22,7 +23,7 @@ struct path_field {
     size_t size;
 };
 
-enum { PATH_FIELDS = 8 };
+enum { PATH_FIELDS = 9 };
 
 static void path_fields(struct booth_settings *b, struct path_field out[PATH_FIELDS])
 {
@@ -35,17 +36,20 @@ static void path_fields(struct booth_settings *b, struct path_field out[PATH_FIE
         FIELD("lamps", "folder", b->lamps.folder),
         FIELD("materials", "folder", b->materials.folder),
         FIELD("materials", "show", b->materials.show),
+        FIELD("quality", "bands", b->quality.bands),
         FIELD("control", "socket", b->control.socket),
 #undef FIELD
     };
     memcpy(out, fields, sizeof fields);
 }
 
-// "host:port" is no path, nor is a material's bare name.
+// "host:port" is no path, nor is a material's bare name or a number of bands.
 static bool names_no_path(const struct path_field *field)
 {
     if (!strcmp(field->section, "accelerometer"))
         return strchr(field->text, ':') && *field->text != '/';
+    if (!strcmp(field->key, "bands"))
+        return !field->text[strspn(field->text, "+-0123456789")];
     return !strcmp(field->key, "show") && !strchr(field->text, '/');
 }
 
@@ -88,6 +92,21 @@ static bool override(struct booth_tables *tables, struct booth_settings *booth, 
     return resolve(booth, NULL, section, key, err);
 }
 
+// What no single row can say.
+static bool check(const struct booth_settings *b, struct error *err)
+{
+    struct band_set bands;
+    struct error why;
+    enum observer observer = b->quality.observer;
+    if (observer != OBSERVER_1931_2)
+        return fail(err, ERROR_CONFIG,
+                    "[quality] observer = %s: display model, radiometer and luminance are in CIE "
+                    "1931 2 degrees; allowed: %s",
+                    observer_name(observer), observer_name(OBSERVER_1931_2));
+    return booth_bands(b, &bands, &why) ||
+           fail(err, ERROR_CONFIG, "[quality] bands = %s: %s", b->quality.bands, why.text);
+}
+
 bool booth_load(const char *path, const char *const *overrides, int count,
                 struct booth_settings *booth, struct error *err)
 {
@@ -101,6 +120,8 @@ bool booth_load(const char *path, const char *const *overrides, int count,
     for (int i = 0; i < count; i++)
         if (!override(&tables, &loaded, overrides[i], err))
             return while_doing(err, "--set");
+    if (!check(&loaded, err))
+        return while_doing(err, "%s", path);
     *booth = loaded;
     return true;
 }
@@ -183,6 +204,11 @@ const struct radiometer_driver *booth_radiometer(const struct booth_settings *b)
 {
     bool there = b->radiometer.driver && *b->radiometer.options.port;
     return there ? radiometer_drivers[b->radiometer.driver - 1] : NULL;
+}
+
+bool booth_bands(const struct booth_settings *booth, struct band_set *out, struct error *err)
+{
+    return bands_named(booth->quality.bands, out, err);
 }
 
 int booth_bits(const struct booth_settings *booth)

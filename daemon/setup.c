@@ -81,7 +81,7 @@ bool setup_reload(const struct setup_source *source, const struct setup *old, st
     s->baked_lamp = -1;
     s->generations = old ? old->generations : 0;
     if (booth_load(source->path, source->overrides, source->override_count, &s->settings, err) &&
-        load_display(s, err) && load_lamps(s, err) && show_again(s, old, err)) {
+        booth_bands(&s->settings, &s->bands, err) && load_display(s, err) && load_lamps(s, err) && show_again(s, old, err)) {
         *out = s;
         return true;
     }
@@ -133,7 +133,7 @@ static bool bake(struct setup *s, int lamp, struct error *err)
     struct xyz white;
     float *texels =
         material_bake(&s->material, &s->lamps.lamps[lamp].irradiance, s->settings.quality.observer,
-                      s->settings.quality.spectral, s->settings.quality.bands, &white, err);
+                      s->settings.quality.spectral, &s->bands, &white, err);
     if (!texels)
         return while_doing(err, "showing %s under %s", s->material_name,
                            s->lamps.lamps[lamp].file.name);

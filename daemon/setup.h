@@ -23,6 +23,7 @@ enum show_kind { SHOW_NOTHING, SHOW_PATCH, SHOW_MATERIAL };
 
 struct setup {
     struct booth_settings settings;
+    struct band_set bands;
     bool has_display;
     struct display_model display;
     uint64_t display_generation;

@@ -50,7 +50,7 @@ static void bake_bands(const struct material *material, const struct baker *bake
 }
 
 static bool prepare(struct baker *baker, const struct material *material, enum spectral_mode mode,
-                    int band_count, struct band_set *shipped, struct error *err)
+                    const struct band_set *bands, struct error *err)
 {
     bool spectra = material->palette_count > 0;
     if (mode == SPECTRAL_FULL && !spectra)
@@ -58,9 +58,9 @@ static bool prepare(struct baker *baker, const struct material *material, enum s
     baker->full = spectra && (mode == SPECTRAL_FULL || mode == SPECTRAL_AUTO);
     if (baker->full)
         return true;
-    baker->set = spectra ? shipped : &material->bands;
-    if (spectra && !band_set_shipped(band_count, shipped, err))
-        return false;
+    baker->set = spectra ? bands : &material->bands;
+    if (!baker->set)
+        return fail(err, ERROR_RANGE, "no bands are named for its spectra");
     return mode == SPECTRAL_PRODUCT
                ? band_matrix_product(baker->set, baker->lamp, baker->observer, &baker->matrix, err)
                : band_matrix_adapted(baker->set, baker->lamp, baker->observer, &baker->matrix, err);
@@ -77,16 +77,15 @@ static struct xyz perfect(const struct baker *baker)
 }
 
 float *material_bake(const struct material *material, const struct spectrum *lamp,
-                     enum observer observer, enum spectral_mode mode, int band_count,
+                     enum observer observer, enum spectral_mode mode, const struct band_set *bands,
                      struct xyz *white, struct error *err)
 {
     struct baker baker = {.lamp = lamp, .observer = observer};
-    struct band_set shipped;
     if (!(xyz_absolute(lamp, observer).Y > 0)) {
         fail(err, ERROR_DATA, "%s: the lamp is dark", material->name);
         return NULL;
     }
-    if (!prepare(&baker, material, mode, band_count, &shipped, err)) {
+    if (!prepare(&baker, material, mode, bands, err)) {
         while_doing(err, "%s", material->name);
         return NULL;
     }

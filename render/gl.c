@@ -19,9 +19,6 @@ static const char *const SAMPLERS[] = {
 
 enum { LIGHTS_A_ROW = 64 };
 
-// In linear light; below it single precision cannot tell.
-static const float GAMUT_TOLERANCE = 1e-6f;
-
 struct renderer {
     struct context *context;
     int width, height;
@@ -330,7 +327,7 @@ static void frame_stage(struct renderer *r, const struct scene *scene)
     glUniform1f(at(program, "code_most"), (float)((1 << r->code_bits) - 1));
     glUniform1i(at(program, "dithered"), scene->dither);
     glUniform1i(at(program, "height"), r->height);
-    glUniform1f(at(program, "tolerance"), GAMUT_TOLERANCE);
+    glUniform1f(at(program, "tolerance"), (float)DISPLAY_GAMUT_TOLERANCE);
     draw(program, r->frame_target, r->width, r->height);
     r->surface = true;
     r->outside = -1;

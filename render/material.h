@@ -49,9 +49,10 @@ void material_fini(struct material *material);
 
 // Relative XYZ per texel under a lamp, Y = 1 for the perfect diffuser:
 // [height][width][3] floats, malloc'd. Done once per lamp change.
-// white is the perfect diffuser's XYZ by the same mode.
+// white is the perfect diffuser's XYZ by the same mode. bands: those that
+// spectra become in the modes BANDS and PRODUCT; NULL when no mode needs them.
 float *material_bake(const struct material *material, const struct spectrum *lamp,
-                     enum observer observer, enum spectral_mode mode, int band_count,
+                     enum observer observer, enum spectral_mode mode, const struct band_set *bands,
                      struct xyz *white, struct error *err);
 
 #endif

@@ -58,7 +58,7 @@ static bool matrix(struct bench *b, struct error *err)
 static bool bake(struct bench *b, struct error *err)
 {
     struct xyz white;
-    float *texels = material_bake(&b->material, &b->lamp, OBSERVER_1931_2, SPECTRAL_BANDS, 6, &white, err);
+    float *texels = material_bake(&b->material, &b->lamp, OBSERVER_1931_2, SPECTRAL_BANDS, &b->bands, &white, err);
     free(texels);
     return texels;
 }
@@ -149,7 +149,7 @@ static bool begin(struct bench *b, struct error *err)
                               .display_generation = 1,
                               .bits = 8,
                               .dither = true};
-    b->scene.texels = material_bake(&b->material, &b->lamp, OBSERVER_1931_2, SPECTRAL_FULL, 6,
+    b->scene.texels = material_bake(&b->material, &b->lamp, OBSERVER_1931_2, SPECTRAL_FULL, NULL,
                                     &b->scene.white, err);
     return b->scene.texels;
 }

@@ -156,12 +156,14 @@ static void out_of_gamut_is_flagged_before_it_is_clipped(void **state)
     struct xyz beyond = display_forward(&m, (struct counts){1, 1, 1});
     struct display_inverse at = display_invert(&m, beyond);
     assert_true(at.in_gamut);
-    beyond.X += 41.24 * 1e-6;
-    beyond.Y += 21.26 * 1e-6;
-    beyond.Z += 1.93 * 1e-6;
+    struct xyz red = {41.24 * DISPLAY_GAMUT_TOLERANCE, 21.26 * DISPLAY_GAMUT_TOLERANCE,
+                      1.93 * DISPLAY_GAMUT_TOLERANCE};
+    beyond = (struct xyz){beyond.X + 0.9 * red.X, beyond.Y + 0.9 * red.Y, beyond.Z + 0.9 * red.Z};
+    assert_true(display_invert(&m, beyond).in_gamut);
+    beyond = (struct xyz){beyond.X + 0.2 * red.X, beyond.Y + 0.2 * red.Y, beyond.Z + 0.2 * red.Z};
     at = display_invert(&m, beyond);
     assert_false(at.in_gamut);
-    assert_near(at.linear.r, 1 + 1e-6, ARITHMETIC);
+    assert_near(at.linear.r, 1 + 1.1 * DISPLAY_GAMUT_TOLERANCE, ARITHMETIC);
     assert_near(at.counts.r, 1, 0);
     at = display_invert(&m, (struct xyz){0.1, 0.1, 0.1});
     assert_false(at.in_gamut);

@@ -3,6 +3,7 @@
 // what is allowed.
 #include "tests/fakes/support.h"
 
+#include "config/bands_file.h"
 #include "config/booth.h"
 #include "config/paths.h"
 #include "tests/fakes/folder.h"
@@ -70,7 +71,10 @@ static void every_bad_line_is_named(void **state)
         {NEEDED "[display]\ndither = yes\ndither = no\n", {"b.conf:14", "dither", "second", ""}},
         {NEEDED "[quality]\nlights = 12.5\n", {"b.conf:13", "lights", "12.5", "whole"}},
         {NEEDED "[quality]\nobserver = cie\n", {"b.conf:13", "observer", "cie", "1931-2"}},
-        {NEEDED "[quality]\nbands = 2\n", {"b.conf:13", "bands", "2", "3..16"}},
+        {NEEDED "[quality]\nbands = 2\n", {"b.conf", "[quality] bands", "2", "3..16"}},
+        {NEEDED "[quality]\nobserver = 1964-10\n", {"b.conf", "1964-10", "1931 2", "radiometer"}},
+        {NEEDED "[quality]\nbands = none.ini\n", {"b.conf", "bands", "none.ini", "cannot be"}},
+        {NEEDED "[quality]\nlights = 0x10\n", {"b.conf:13", "lights", "0x10", "not a number"}},
         {NEEDED "[tracker]\nplace_m = 0 1\n", {"b.conf:13", "place_m", "", ""}},
         {NEEDED "[tracker]\nplace_m = 0 1 2 3\n", {"b.conf:13", "place_m", "3", ""}},
         {NEEDED "[tracker]\npitch_deg = 10 deg\n", {"b.conf:13", "pitch_deg", "10 deg", ""}},
@@ -114,6 +118,27 @@ static void paths_are_relative_to_the_file(void **state)
     assert_string_equal(b.control.socket, folder_at(&here, "s"));
     assert_string_equal(b.materials.folder, "");
     assert_string_equal(b.materials.show, "white"); // a name, no path
+}
+
+static void bands_are_a_number_or_a_file_beside_the_settings(void **state)
+{
+    (void)state;
+    struct booth_settings b;
+    struct band_set made, loaded;
+    struct error err = {0};
+    assert_true(load(NEEDED, &b, NULL));
+    assert_true(booth_bands(&b, &loaded, NULL));
+    assert_int_equal(loaded.count, 6);
+    const double centre[] = {450, 550, 600, 650}, width[] = {30, 25, 20, 30};
+    assert_true(band_set_make(4, centre, width, &made, NULL));
+    assert_true(bands_save(folder_at(&here, "mine.ini"), &made, NULL));
+    if (!load(NEEDED "[quality]\nbands = mine.ini\n", &b, &err))
+        print_error("%s\n", err.text);
+    assert_string_equal(b.quality.bands, folder_at(&here, "mine.ini"));
+    assert_true(booth_bands(&b, &loaded, &err));
+    assert_int_equal(loaded.count, 4);
+    assert_near(loaded.centre_nm[2], 600, EXACT);
+    assert_near(loaded.width_nm[1], 25, EXACT);
 }
 
 static void a_network_port_is_no_path(void **state)
@@ -269,6 +294,7 @@ int main(void)
         cmocka_unit_test(every_bad_line_is_named),
         cmocka_unit_test(a_file_that_is_not_there_is_named),
         cmocka_unit_test(paths_are_relative_to_the_file),
+        cmocka_unit_test(bands_are_a_number_or_a_file_beside_the_settings),
         cmocka_unit_test(a_network_port_is_no_path),
         cmocka_unit_test(a_path_that_does_not_fit_is_refused),
         cmocka_unit_test(overrides_win_over_the_file_and_are_checked_like_it),

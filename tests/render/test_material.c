@@ -42,7 +42,10 @@ static struct material chart(int columns, int rows, double gap, int background)
 static float *bake(const struct material *m, enum spectral_mode mode, int bands, struct xyz *white)
 {
     struct error err = {0};
-    float *texels = material_bake(m, &lamp, OBSERVER_1931_2, mode, bands, white, &err);
+    struct band_set set;
+    assert_true(!bands || band_set_shipped(bands, &set, NULL));
+    float *texels =
+        material_bake(m, &lamp, OBSERVER_1931_2, mode, bands ? &set : NULL, white, &err);
     assert_good(texels, err);
     return texels;
 }
@@ -169,16 +172,16 @@ static void bands_come_close_to_full_spectra_and_more_of_them_closer(void **stat
     material_fini(&m);
 }
 
-static void a_dark_lamp_and_unknown_band_counts_are_refused(void **state)
+static void a_dark_lamp_and_bands_that_nobody_named_are_refused(void **state)
 {
     (void)state;
     struct material m = chart(2, 2, 0, 0);
     struct spectrum dark = {{0}};
     struct xyz white;
     struct error err = {0};
-    assert_null(material_bake(&m, &dark, OBSERVER_1931_2, SPECTRAL_FULL, 6, &white, &err));
+    assert_null(material_bake(&m, &dark, OBSERVER_1931_2, SPECTRAL_FULL, NULL, &white, &err));
     assert_int_equal(err.code, ERROR_DATA);
-    assert_null(material_bake(&m, &lamp, OBSERVER_1931_2, SPECTRAL_BANDS, 2, &white, &err));
+    assert_null(material_bake(&m, &lamp, OBSERVER_1931_2, SPECTRAL_BANDS, NULL, &white, &err));
     assert_int_equal(err.code, ERROR_RANGE);
     material_fini(&m);
 }
@@ -244,7 +247,7 @@ static void bands_from_an_image_bake_like_the_surfaces_they_stand_for(void **sta
     }
     free(texels);
     free(same);
-    assert_null(material_bake(&m, &lamp, OBSERVER_1931_2, SPECTRAL_FULL, 6, &white, &err));
+    assert_null(material_bake(&m, &lamp, OBSERVER_1931_2, SPECTRAL_FULL, NULL, &white, &err));
     assert_int_equal(err.code, ERROR_CONFIG);
     material_fini(&flat);
     material_fini(&m);
@@ -337,7 +340,7 @@ int main(void)
         cmocka_unit_test(the_perfect_diffuser_bakes_to_white_with_y_1_in_every_mode),
         cmocka_unit_test(full_mode_bakes_each_patch_to_its_exact_tristimulus_values),
         cmocka_unit_test(bands_come_close_to_full_spectra_and_more_of_them_closer),
-        cmocka_unit_test(a_dark_lamp_and_unknown_band_counts_are_refused),
+        cmocka_unit_test(a_dark_lamp_and_bands_that_nobody_named_are_refused),
         cmocka_unit_test(bands_from_an_image_bake_like_the_surfaces_they_stand_for),
         cmocka_unit_test(an_image_may_bring_its_own_band_set_but_not_half_of_one),
         cmocka_unit_test(an_image_of_the_most_bands_brings_all_its_shapes),
