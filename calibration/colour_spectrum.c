@@ -3,6 +3,7 @@
 
 #include <getopt.h>
 #include <jansson.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -45,13 +46,14 @@ struct row {
 struct rows {
     size_t count;
     struct row *rows;
+    char warning[320]; // of the reflectances
 };
 
 // ---- the command line --------------------------------------------------------
 
 static int bad_usage(const char *what, const char *value)
 {
-    return command_bad_usage("boothcal colour spectrum: %s%s; see boothcal colour --help", what,
+    return command_bad_usage("boothcal colour spectrum: %s%s; see boothcal colour spectrum --help", what,
                              value);
 }
 
@@ -92,16 +94,6 @@ static int set_option(struct options *o, int option, bool *mode_given)
         return bad_usage("--mode is one of full, bands, product, not ", optarg);
     }
     return COMMAND_USAGE;
-}
-
-static void print_help(void)
-{
-    puts("usage: boothcal colour spectrum --light FILE|NAME [--reflectance TABLE]\n"
-         "           [--observer 1931-2|1964-10|2015-2|2015-10]\n"
-         "           [--mode full|bands|product] [--bands FILE|COUNT] [--json]\n"
-         "Files are CSV (nm, v1, v2, ...) or CGATS (.sp). Without --reflectance the lamp\n"
-         "itself is shown. Y = 100 for the perfect white; the white of Lab is the lamp;\n"
-         "CCT and Duv are by the 1931 observer.");
 }
 
 static int parse(int argc, char **argv, struct options *o)
@@ -176,6 +168,16 @@ static struct xyz way_xyz(const struct way *w, const struct spectrum *reflectanc
     return band_xyz(&w->matrix[observer], &c);
 }
 
+static bool all_finite(const struct row *r)
+{
+    const double v[] = {r->xyz.X, r->xyz.Y, r->xyz.Z, r->lab.L, r->lab.a,
+                        r->lab.b, r->xy.x,  r->xy.y};
+    bool finite = true;
+    for (size_t i = 0; i < sizeof v / sizeof *v; i++)
+        finite &= isfinite(v[i]) != 0;
+    return finite;
+}
+
 static bool fill_row(struct row *row, const char *name, const struct way *w,
                      const struct spectrum *reflectance, enum observer observer, struct error *err)
 {
@@ -184,7 +186,9 @@ static bool fill_row(struct row *row, const char *name, const struct way *w,
     row->xyz = way_xyz(w, reflectance, observer);
     row->xy = xy_of(row->xyz);
     row->cct = cct_of(xy_of(way_xyz(w, reflectance, OBSERVER_1931_2)));
-    return lab_of(row->xyz, white, &row->lab, err);
+    if (!lab_of(row->xyz, white, &row->lab, err))
+        return false;
+    return all_finite(row) || fail(err, ERROR_DATA, "%s: its colour is no finite number", name);
 }
 
 static struct spectrum perfect_white(void)
@@ -258,6 +262,7 @@ static bool compute(const struct options *o, struct rows *out, struct error *err
     if (ok)
         ok = o->reflectance ? rows_of_surfaces(o, &lamps, &surfaces, out, err)
                             : rows_of_lamps(o, &lamps, out, err);
+    snprintf(out->warning, sizeof out->warning, "%s", surfaces.warning);
     spectra_fini(&lamps);
     spectra_fini(&surfaces);
     return ok;
@@ -313,10 +318,6 @@ int command_colour_spectrum(int argc, char **argv)
     struct options o = {.observer = OBSERVER_1931_2, .mode = MODE_FULL};
     struct rows rows = {0};
     struct error err;
-    if (argc == 2 && !strcmp(argv[1], "--help")) {
-        print_help();
-        return COMMAND_FINE;
-    }
     int code = parse(argc, argv, &o);
     if (code)
         return code;
@@ -326,5 +327,5 @@ int command_colour_spectrum(int argc, char **argv)
     else if (ok)
         print_text(&rows);
     free(rows.rows);
-    return ok ? COMMAND_FINE : command_bad_input(&err);
+    return ok ? command_warned(rows.warning) : command_bad_input(&err);
 }

@@ -18,12 +18,14 @@ struct command {
     const char *name; // NULL ends a table
     int (*run)(int argc, char **argv); // argv[0] is the command's own name
     const char *arguments;             // "FILE [--json]", "" without
-    const char *help;                  // one sentence
+    const char *help; // one sentence; then, behind an empty line, a line for each option, which
+                      // only the row's own --help shows. Without those the row answers --help.
 };
 
-// Runs the row that argv[1] names, or prints the table's help ("--help",
-// "help", or nothing, which is COMMAND_USAGE). family is what stands before,
-// such as "boothcal colour".
+// Runs the row that argv[1] names, or prints its help when "--help" or "-h" is
+// among its arguments, or the table's help ("--help", "-h", "help", or nothing,
+// which is COMMAND_USAGE). family is what stands before, such as "boothcal
+// colour".
 int command_run(const char *family, const struct command *table, int argc, char **argv);
 
 // Each prints one line on stderr and returns the exit code of its name.
@@ -31,11 +33,13 @@ int command_bad_usage(const char *format, ...) __attribute__((format(printf, 1, 
 int command_bad_input(const struct error *err);
 int command_failed(const struct error *err);
 
+// Prints the warning; COMMAND_FINE without one ("").
+int command_warned(const char *warning);
+
 // The families. Each takes its own name as argv[0].
 int command_colour(int argc, char **argv);
 int command_display(int argc, char **argv);
 int command_bands(int argc, char **argv);
 int command_session(int argc, char **argv);
-int command_report(int argc, char **argv);
 
 #endif

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include <unistd.h>
 
 #include "colorimetry/illuminant.h"
 #include "files/cgats.h"
@@ -13,10 +14,15 @@
 
 #define FIELD_SLACK_NM 0.51 // field names carry whole nanometres
 #define LAMP_NOISE 0.05     // of its peak: an instrument's noise where it sees badly
-#define SURFACE_LEAST -0.1  // likewise
-#define SURFACE_MOST 2.0    // beyond it a "reflectance" is per cent or counts
+#define LAMP_LEAST 1e-30    // a peak beyond these is no power in any unit,
+#define LAMP_MOST 1e30      // and sums of it leave what a double holds
+#define SURFACE_LEAST -0.02 // noise
+#define SURFACE_SURE 1.05   // noise; beyond it the surface fluoresces
+#define SURFACE_MOST 1.3    // beyond it a "reflectance" is per cent or counts
+#define NEEDED_FIRST_NM 420.0
+#define NEEDED_LAST_NM 680.0
 
-enum { FIELDS_LEAST = 2 };
+enum { FIELDS_LEAST = 2, NEEDED_SAMPLES = 8 };
 
 void spectra_fini(struct spectra *s)
 {
@@ -57,31 +63,77 @@ static bool bad_value(const struct samples *s, size_t i, const char *must, struc
                 s->of_line[i * s->line_step], s->name, s->values[i], s->nm[i], must);
 }
 
-// What a value may be: a lamp's power is not negative but for noise, a surface
-// is no per cent. What lies outside the grid is not looked at.
-static bool check_values(const struct samples *s, bool held, struct error *err)
+static bool on_grid(double nm)
 {
-    double peak = 0;
+    return nm >= SPECTRUM_FIRST_NM && nm <= SPECTRUM_LAST_NM;
+}
+
+// A lamp's power is not negative but for noise, and of a size that sums keep.
+static bool check_lamp(const struct samples *s, struct error *err)
+{
+    size_t top = 0;
     for (size_t i = 0; i < s->count; i++)
-        peak = fmax(peak, s->values[i]);
+        if (s->values[i] > s->values[top])
+            top = i;
+    double peak = fmax(s->values[top], 0);
+    if (peak > 0 && !(peak >= LAMP_LEAST && peak <= LAMP_MOST))
+        return bad_value(s, top, "allowed: a largest power of 1e-30..1e30", err);
+    for (size_t i = 0; i < s->count; i++)
+        if (on_grid(s->nm[i]) && s->values[i] < -LAMP_NOISE * peak)
+            return bad_value(s, i, "a lamp's power must be 0 or more", err);
+    return true;
+}
+
+// What lies outside the grid is not looked at.
+static bool check_surface(const struct samples *s, struct spectra *out, struct error *err)
+{
     for (size_t i = 0; i < s->count; i++) {
         double v = s->values[i];
-        if (s->nm[i] < SPECTRUM_FIRST_NM || s->nm[i] > SPECTRUM_LAST_NM)
+        if (!on_grid(s->nm[i]) || (v >= SURFACE_LEAST && v <= SURFACE_SURE))
             continue;
-        if (!held && v < -LAMP_NOISE * peak)
-            return bad_value(s, i, "a lamp's power must be 0 or more", err);
-        if (held && (v > SURFACE_MOST || v < SURFACE_LEAST))
-            return bad_value(s, i, "a reflectance must lie in 0..1 (is it per cent?)", err);
+        if (!(v >= SURFACE_LEAST && v <= SURFACE_MOST))
+            return bad_value(s, i,
+                             "allowed: a reflectance -0.02..1.3, 1 for the perfect white (is it "
+                             "per cent?)",
+                             err);
+        if (!*out->warning)
+            snprintf(out->warning, sizeof out->warning,
+                     "%.150s:%d: %.30s: %g at %g nm is above 1.05; does the surface fluoresce?",
+                     s->path, s->of_line[i * s->line_step], s->name, v, s->nm[i]);
     }
     return true;
 }
 
-static bool take_samples(const struct samples *s, bool held, struct spectrum *out,
+// Enough of the visible range, closely enough. Few samples tell an even
+// spectrum only.
+static bool check_range(const struct samples *s, struct error *err)
+{
+    double first = s->nm[0], last = s->nm[s->count - 1];
+    size_t within = 0;
+    bool even = true;
+    for (size_t i = 0; i < s->count; i++) {
+        within += s->nm[i] >= NEEDED_FIRST_NM && s->nm[i] <= NEEDED_LAST_NM;
+        even &= s->values[i] == s->values[0];
+    }
+    if (!(first <= NEEDED_FIRST_NM && last >= NEEDED_LAST_NM))
+        return fail(err, ERROR_DATA,
+                    "%s: %s: wavelengths %g..%g; needed are %g or below to %g or above, in "
+                    "nanometres",
+                    s->path, s->name, first, last, NEEDED_FIRST_NM, NEEDED_LAST_NM);
+    if (within < NEEDED_SAMPLES && !even)
+        return fail(err, ERROR_DATA,
+                    "%s: %s: %zu samples from %g to %g nm; needed are at least %d, unless all are "
+                    "equal",
+                    s->path, s->name, within, NEEDED_FIRST_NM, NEEDED_LAST_NM, NEEDED_SAMPLES);
+    return true;
+}
+
+static bool take_samples(const struct samples *s, bool held, struct spectra *out, size_t i,
                          struct error *err)
 {
-    if (!check_values(s, held, err))
+    if (!(held ? check_surface(s, out, err) : check_lamp(s, err)) || !check_range(s, err))
         return false;
-    return spectrum_from_samples(s->nm, s->values, s->count, held, out, err) ||
+    return spectrum_from_samples(s->nm, s->values, s->count, held, &out->spectra[i], err) ||
            while_doing(err, "%s:%d: %s", s->path, s->of_line[0], s->name);
 }
 
@@ -112,7 +164,7 @@ static bool csv_column(const struct table *t, size_t column, bool held, double *
         values[i] = table_at(t, i, column);
     }
     struct samples s = {t->path, out->names[column - 1], nm, values, t->rows, 1, t->lines};
-    return take_samples(&s, held, &out->spectra[column - 1], err);
+    return take_samples(&s, held, out, column - 1, err);
 }
 
 static bool from_csv(const struct table *t, bool held, struct spectra *out, struct error *err)
@@ -145,10 +197,13 @@ static bool find_fields(const struct table *t, struct fields *f, struct error *e
     for (size_t c = 0; c < t->columns; c++) {
         if (strncmp(t->names[c], "SPEC_", 5) != 0)
             continue;
-        char *end;
-        f->nm[f->count] = strtod(t->names[c] + 5, &end);
-        if (*end || end == t->names[c] + 5)
-            return fail(err, ERROR_DATA, "%s: field %s names no wavelength", t->path, t->names[c]);
+        const char *digits = t->names[c] + 5;
+        size_t size = strspn(digits, "0123456789");
+        if (digits[size] || !size || size > 5)
+            return fail(err, ERROR_DATA,
+                        "%s: field %.60s names no wavelength; allowed: SPEC_ and whole nanometres",
+                        t->path, t->names[c]);
+        f->nm[f->count] = atoi(digits);
         f->columns[f->count++] = c;
     }
     if (f->count < FIELDS_LEAST)
@@ -214,7 +269,7 @@ static bool cgats_row(const struct table *t, size_t row, const struct fields *f,
     for (size_t i = 0; i < f->count; i++)
         values[i] = table_at(t, row, f->columns[i]) / f->norm;
     struct samples s = {t->path, out->names[row], f->nm, values, f->count, 0, &t->lines[row]};
-    return take_samples(&s, held, &out->spectra[row], err);
+    return take_samples(&s, held, out, row, err);
 }
 
 static bool from_cgats(const struct cgats *file, bool held, struct spectra *out, struct error *err)
@@ -271,13 +326,24 @@ bool spectra_load(const char *path, bool held, struct spectra *out, struct error
 
 bool spectra_is_path(const char *text)
 {
-    return strchr(text, '/') || ends_with(text, ".csv") || ends_with(text, ".sp");
+    struct spectrum cie;
+    if (strchr(text, '/') || ends_with(text, ".csv") || ends_with(text, ".sp"))
+        return true;
+    return !illuminant(text, &cie, NULL) && access(text, F_OK) == 0;
+}
+
+static bool cie_lamp(const char *name, struct spectrum *out, struct error *err)
+{
+    struct error why;
+    return illuminant(name, out, &why) ||
+           fail(err, why.code, "%s (a file is named by a path that exists, or ./%.40s)", why.text,
+                name);
 }
 
 bool lamp_spectrum(const char *name_or_path, struct spectrum *out, struct error *err)
 {
     if (!spectra_is_path(name_or_path))
-        return illuminant(name_or_path, out, err);
+        return cie_lamp(name_or_path, out, err);
     struct spectra loaded = {0};
     if (!spectra_load(name_or_path, false, &loaded, err))
         return false;

@@ -139,11 +139,69 @@ static void deltae_reads_a_file_and_passes_over_its_header(void **state)
     unlink(path);
 }
 
-static void deltae_of_nothing_is_nothing(void **state)
+static void deltae_wants_a_line_of_numbers(void **state)
 {
     (void)state;
-    assert_int_equal(run("deltae", ""), COMMAND_FINE);
-    assert_string_equal(said, "");
+    static const char *const empty[] = {"", "\n# nothing\n", "a b c d e f\n", "L,a,b,L,a,b\r\n"};
+    for (size_t i = 0; i < sizeof empty / sizeof *empty; i++) {
+        assert_int_equal(run("deltae", empty[i]), COMMAND_USAGE);
+        assert_one_line_says("stdin: no line of numbers", "L1 a1 b1 L2 a2 b2");
+    }
+}
+
+static void deltae_passes_over_a_mark_and_a_first_line_of_names(void **state)
+{
+    (void)state;
+    assert_int_equal(run("deltae", "\xef\xbb\xbf 50 0 0 52 0 0\n"), COMMAND_FINE);
+    assert_near(atof(said), 2, 0.1); // lightness weighs about 1 at 50
+    assert_int_equal(run("deltae", "# pairs\nL1;a1;b1;L2;a2;b2;DE00\n50;0;0;50;0;0\n"),
+                     COMMAND_FINE);
+    assert_near(atof(said), 0, 0);
+}
+
+static void deltae_does_not_guess_at_decimal_commas(void **state)
+{
+    (void)state;
+    static const char *const bad[] = {"1,5 2,5 3,5\n", "1,5; 2; 3; 4; 5; 6\n", "1,5\t2,5\t3,5\n",
+                                      "50 0 0 51 0 0,5\n"};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        assert_int_equal(run("deltae", bad[i]), COMMAND_USAGE);
+        assert_one_line_says("stdin:1:", "decimal comma");
+    }
+    assert_int_equal(run("deltae", " 50,0,0,50,0,0 \n"), COMMAND_FINE);
+    assert_int_equal(run("deltae", "50, 0, 0, 50, 0, 0\n"), COMMAND_FINE);
+}
+
+// As run, with bytes as standard input.
+static int run_bytes(const char *words, const char *bytes, size_t size)
+{
+    char path[128];
+    snprintf(path, sizeof path, "%s/bytes", folder);
+    FILE *out = fopen(path, "w");
+    assert_non_null(out);
+    assert_int_equal(fwrite(bytes, 1, size, out), size);
+    fclose(out);
+    char line[256];
+    snprintf(line, sizeof line, "%s %s", words, path);
+    int code = run(line, NULL);
+    unlink(path);
+    return code;
+}
+
+static void deltae_refuses_what_is_no_text(void **state)
+{
+    (void)state;
+    static const char NUL[] = "50 0 0 51 0 0\n50 0\0 0 51 0 0\n";
+    assert_int_equal(run_bytes("deltae", NUL, sizeof NUL - 1), COMMAND_USAGE);
+    assert_one_line_says("bytes:2:", "0x00");
+    size_t size = (1 << 20) + 1;
+    char *line = malloc(size);
+    memset(line, '5', size);
+    assert_int_equal(run_bytes("deltae", line, size), COMMAND_USAGE);
+    assert_one_line_says("bytes:1:", "longer than 1048576 bytes");
+    free(line);
+    assert_int_equal(run_with("deltae %s", folder, ""), COMMAND_USAGE);
+    assert_one_line_says(folder, "directory");
 }
 
 static void deltae_refuses_bad_lines_by_number_without_partial_output(void **state)
@@ -153,11 +211,11 @@ static void deltae_refuses_bad_lines_by_number_without_partial_output(void **sta
     static const struct {
         const char *line, *says;
     } bad[] = {
-        {"1 2 3 4 5\n", "5 number(s)"},   {"1 2 3 4 5 6 7\n", "more than six"},
+        {"1 2 3 4 5\n", "5 number(s)"},   {"1 2 3 4 5 6 7\n", "more than 6"},
         {"1 2 3 4 5 x\n", "\"x\""},       {"1 2 nan 4 5 6\n", "\"nan\""},
         {"1 2 inf 4 5 6\n", "\"inf\""},   {"L a b L a b\n", "\"L\""},
-        {"1 2 3 4 5 6e999\n", "6e999"},   {"1 2 3 4 5 6,5x\n", "more than six"},
-        {"1 2 3.5.1 4 5 6\n", "3.5.1"},
+        {"1 2 3 4 5 6e999\n", "6e999"},   {"1 2 3 4 5 6,5x\n", "decimal comma"},
+        {"1 2 3.5.1 4 5 6\n", "3.5.1"}, {"0x1 0x2 0x3 0x4 0x5 0x6\n", "0x1"},
     };
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         char input[256];
@@ -246,7 +304,8 @@ static void observers_differ_and_cct_stays_that_of_1931(void **state)
 static void six_bands_come_near_to_the_full_spectrum(void **state)
 {
     (void)state;
-    const char *table = file("smooth.csv", "400,.1,.8\n500,.3,.5\n600,.6,.2\n700,.5,.3\n");
+    const char *table = file("smooth.csv", "400,.1,.8\n430,.2,.7\n460,.2,.6\n500,.3,.5\n530,.4,.4\n560,.5,"
+                                          ".3\n600,.6,.2\n630,.6,.2\n660,.6,.2\n700,.5,.3\n");
     const char *const modes[] = {"full", "bands", "product"};
     struct xyz seen[3];
     for (int i = 0; i < 3; i++) {
@@ -286,7 +345,7 @@ static void bands_may_come_from_a_file(void **state)
 static void text_output_has_a_line_for_each_row(void **state)
 {
     (void)state;
-    const char *lamps = file("lamps.csv", "nm,one,two\n400,1,2\n550,2,1\n700,3,1\n");
+    const char *lamps = file("lamps.csv", "nm,one,two\n400,1,2\n700,1,2\n");
     assert_int_equal(run_with("spectrum --light %s", lamps, ""), COMMAND_FINE);
     unlink(lamps);
     int lines = 0;
@@ -335,6 +394,9 @@ static void bad_files_are_refused_with_place_and_reason(void **state)
         {"nm,v\n400,1\n380,1\n700,1\n", ":3:"}, {"nm,v\n400,1\n500,nan\n700,1\n", ":3:"},
         {"nm,v\n.4,1\n.5,1\n.7,1\n", "nanometres"}, {"nm,v\n400,1\n500,-1\n700,1\n", ":3:"},
         {"nm,v\n400,0\n500,0\n700,0\n", "no light"}, {"", "bad.csv"},
+        {"nm,v\n380,1e-320\n780,1e-320\n", ":2: v: 9.99989e-321"},
+        {"nm,v,w\n380,1,1e300\n780,1,1e300\n", ":2: w: 1e+300"},
+        {"nm,v\n380,1\n425,1\n", "380..425"},
     };
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         const char *path = file("bad.csv", bad[i].text);
@@ -349,11 +411,35 @@ static void bad_files_are_refused_with_place_and_reason(void **state)
     unlink(r);
 }
 
+static void a_surface_that_fluoresces_is_a_warning(void **state)
+{
+    (void)state;
+    const char *table = file("paper.csv", "nm,paper\n380,1.2\n780,1.2\n");
+    assert_int_equal(run_with("spectrum --light D50 --reflectance %s --json", table, ""),
+                     COMMAND_WARNED);
+    assert_non_null(strstr(complained, "warning: "));
+    assert_non_null(strstr(complained, "paper: 1.2 at 380 nm"));
+    json_t *list = rows();
+    assert_near(number(json_array_get(list, 0), "XYZ", 1), 120, JSON);
+    json_decref(list);
+    unlink(table);
+}
+
+static void help_names_every_option(void **state)
+{
+    (void)state;
+    static const char *const options[] = {"--light", "--reflectance", "--observer", "--mode",
+                                          "--bands", "--json"};
+    assert_int_equal(run("spectrum --light A --help", NULL), COMMAND_FINE);
+    for (size_t i = 0; i < sizeof options / sizeof *options; i++)
+        assert_non_null(strstr(said, options[i]));
+}
+
 static void help_is_given(void **state)
 {
     (void)state;
-    const char *const words[] = {"--help", "deltae --help", "spectrum --help"};
-    for (int i = 0; i < 3; i++) {
+    const char *const words[] = {"--help", "deltae --help", "spectrum --help", "deltae -h"};
+    for (int i = 0; i < 4; i++) {
         assert_int_equal(run(words[i], NULL), COMMAND_FINE);
         assert_non_null(strstr(said, "usage"));
         assert_string_equal(complained, "");
@@ -367,7 +453,10 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(deltae_reads_pairs_and_writes_differences),
         cmocka_unit_test(deltae_reads_a_file_and_passes_over_its_header),
-        cmocka_unit_test(deltae_of_nothing_is_nothing),
+        cmocka_unit_test(deltae_wants_a_line_of_numbers),
+        cmocka_unit_test(deltae_passes_over_a_mark_and_a_first_line_of_names),
+        cmocka_unit_test(deltae_does_not_guess_at_decimal_commas),
+        cmocka_unit_test(deltae_refuses_what_is_no_text),
         cmocka_unit_test(deltae_refuses_bad_lines_by_number_without_partial_output),
         cmocka_unit_test(a_lamp_shows_itself_as_white),
         cmocka_unit_test(surfaces_are_seen_under_the_lamp),
@@ -377,6 +466,8 @@ int main(void)
         cmocka_unit_test(text_output_has_a_line_for_each_row),
         cmocka_unit_test(bad_words_are_refused),
         cmocka_unit_test(bad_files_are_refused_with_place_and_reason),
+        cmocka_unit_test(a_surface_that_fluoresces_is_a_warning),
+        cmocka_unit_test(help_names_every_option),
         cmocka_unit_test(help_is_given),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

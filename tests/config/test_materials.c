@@ -17,7 +17,9 @@ static int open_here(void **state)
     (void)state;
     folder_open(&here);
     snprintf(booth.materials.folder, sizeof booth.materials.folder, "%s", here.path);
-    folder_put(&here, "two.csv", "nm,red,blue\n380,0.1,0.5\n560,0.2,0.3\n780,0.8,0.1\n");
+    folder_put(&here, "two.csv",
+               "nm,red,blue\n380,.1,.5\n420,.1,.5\n450,.1,.5\n480,.1,.4\n520,.1,.4\n560,.2,.3\n"
+               "600,.6,.2\n640,.7,.1\n670,.8,.1\n700,.8,.1\n780,.8,.1\n");
     return 0;
 }
 
@@ -135,7 +137,7 @@ static void every_bad_material_is_named(void **state)
         {"[material]\nname = x\nkind = flat\nreflectance = 1.5\n", {"m.ini:4", "1.5", "0..1"}},
         {"[material]\nname = x\nkind = flat\nsource = two.csv\n", {"m.ini", "source", "2 spectra"}},
         {"[material]\nname = x\nkind = flat\nsource = no.csv\n", {"m.ini", "no.csv", ""}},
-        {"[material]\nname = x\nkind = flat\nsource = loud.csv\n", {"loud.csv:3", "80", "0..1"}},
+        {"[material]\nname = x\nkind = flat\nsource = loud.csv\n", {"loud.csv:3", "80", "-0.02..1.3"}},
         {"[material]\nname = x\nkind = flat\nsource = back.csv\n", {"back.csv", "", ""}},
         {"[material]\nname = x\nkind = chart\n", {"m.ini", "source", "table of spectra"}},
         {"[material]\nname = x\nkind = chart\nsource = two.csv\ncolumns = 2\nrows = 2\n",

@@ -81,7 +81,10 @@ static double at(const struct spectra *s, int i, int nm)
 static void csv_with_and_without_names_is_read(void **state)
 {
     (void)state;
-    struct spectra s = load("two.csv", "nm,first one,second\n400,.1,.2\n500,.3,.4\n700,.5,.6\n",
+    struct spectra s = load("two.csv",
+                            "nm,first one,second\n400,.1,.2\n420,.14,.24\n450,.2,.3\n500,.3,.4\n"
+                            "550,.35,.45\n580,.38,.48\n600,.4,.5\n650,.45,.55\n670,.47,.57\n"
+                            "700,.5,.6\n",
                             true);
     assert_int_equal(s.count, 2);
     assert_string_equal(s.names[0], "first one");
@@ -90,7 +93,10 @@ static void csv_with_and_without_names_is_read(void **state)
     assert_near(at(&s, 1, 600), 0.5, ROUNDING);
     assert_near(at(&s, 1, 830), 0.6, ROUNDING);
     spectra_fini(&s);
-    s = load("bare.csv", "# a lamp\n400 1 2\n500 3 4\n700 5 6\n", false);
+    s = load("bare.csv",
+             "# a lamp\n400 1 2\n420 1.4 2.4\n450 2 3\n500 3 4\n550 3.5 4.5\n580 3.8 4.8\n"
+             "650 4.5 5.5\n660 4.6 5.6\n670 4.7 5.7\n700 5 6\n",
+             false);
     assert_int_equal(s.count, 2);
     assert_string_equal(s.names[0], "1");
     assert_string_equal(s.names[1], "2");
@@ -102,7 +108,10 @@ static void csv_with_and_without_names_is_read(void **state)
 static void noise_of_an_instrument_is_kept(void **state)
 {
     (void)state;
-    struct spectra s = load("noisy.csv", "300,-9\n365,-.1\n400,1\n550,3\n700,1\n850,-9\n", false);
+    struct spectra s = load("noisy.csv",
+                            "300,-9\n365,-.1\n400,1\n450,1\n480,1\n500,1\n530,1\n550,3\n600,1\n"
+                            "630,1\n660,1\n700,1\n850,-9\n",
+                            false);
     assert_near(at(&s, 0, 365), -0.1, ROUNDING);
     spectra_fini(&s);
 }
@@ -123,21 +132,89 @@ static void csv_that_makes_no_sense_is_refused(void **state)
     refused("k.csv", "nm,v\n400,1\n500,x\n700,1\n", false, ":3:", "x");
 }
 
+static void a_range_that_misses_visible_light_is_refused(void **state)
+{
+    (void)state;
+    const char *tens = "%s430,1\n440,1\n450,1\n460,1\n470,1\n480,1\n490,1\n500,1\n%s";
+    static const struct {
+        const char *first, *last, *says;
+    } bad[] = {
+        {"", "680,1\n", "430..680"},
+        {"420,1\n", "679,1\n", "420..679"},
+        {"380,1\n", "", "380..500"},
+        {"421,1\n", "730,1\n", "421..730"},
+    };
+    char text[256];
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wformat-nonliteral"
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        snprintf(text, sizeof text, tens, bad[i].first, bad[i].last);
+        refused("part.csv", text, false, bad[i].says, "420 or below to 680 or above");
+        refused("part.csv", text, true, bad[i].says, "420 or below to 680 or above");
+    }
+    snprintf(text, sizeof text, tens, "420,1\n", "680,1\n");
+#pragma GCC diagnostic pop
+    struct spectra s = load("whole.csv", text, true);
+    spectra_fini(&s);
+}
+
+static void few_samples_tell_an_even_spectrum_only(void **state)
+{
+    (void)state;
+    refused("few.csv", "400,1\n420,2\n450,1\n500,1\n550,1\n600,1\n650,1\n680.5,1\n", false,
+            "6 samples", "at least 8");
+    refused("few.csv", "400,.2\n700,.3\n", true, "0 samples", "at least 8");
+    struct spectra s = load("even.csv", "400,.2\n700,.2\n", true);
+    assert_near(at(&s, 0, 555), 0.2, ROUNDING);
+    assert_string_equal(s.warning, "");
+    spectra_fini(&s);
+}
+
+static void reflectances_have_bounds(void **state)
+{
+    (void)state;
+    struct spectra s = load("noise.csv", "380,-.02\n780,-.02\n", true);
+    spectra_fini(&s);
+    s = load("noise.csv", "380,1.05\n780,1.05\n", true);
+    assert_string_equal(s.warning, "");
+    spectra_fini(&s);
+    s = load("bright.csv", "nm,paper\n380,1.3\n780,1.3\n", true);
+    assert_non_null(strstr(s.warning, "bright.csv:2: paper: 1.3 at 380 nm is above 1.05"));
+    spectra_fini(&s);
+    refused("high.csv", "380,1.31\n780,1.31\n", true, ":1:", "-0.02..1.3");
+    refused("low.csv", "380,-.021\n780,-.021\n", true, ":1:", "-0.02..1.3");
+}
+
+static void powers_of_no_unit_are_refused(void **state)
+{
+    (void)state;
+    refused("tiny.csv", "nm,lamp\n380,1e-320\n780,1e-320\n", false, ":2: lamp: 9.99989e-321",
+            "1e-30..1e30");
+    refused("huge.csv", "nm,lamp\n380,1\n780,1e300\n", false, ":3: lamp: 1e+300", "1e-30..1e30");
+    struct spectra s = load("small.csv", "380,1e-30\n780,1e-30\n", false);
+    spectra_fini(&s);
+}
+
 #define SP(bands, start, end, norm, fields, sets, data)                                            \
     "SPECT\n\nDESCRIPTOR \"a lamp\"\nKEYWORD \"SPECTRAL_BANDS\"\nSPECTRAL_BANDS \"" bands          \
     "\"\nKEYWORD \"SPECTRAL_START_NM\"\nSPECTRAL_START_NM \"" start                                \
     "\"\nKEYWORD \"SPECTRAL_END_NM\"\nSPECTRAL_END_NM \"" end                                      \
     "\"\nKEYWORD \"SPECTRAL_NORM\"\nSPECTRAL_NORM \"" norm                                         \
-    "\"\nNUMBER_OF_FIELDS 4\nBEGIN_DATA_FORMAT\n" fields                                           \
+    "\"\nBEGIN_DATA_FORMAT\n" fields                                                               \
     "\nEND_DATA_FORMAT\nNUMBER_OF_SETS " sets "\nBEGIN_DATA\n" data "\nEND_DATA\n"
 
 #define FIELDS "SPEC_400 SPEC_500 SPEC_600 SPEC_700"
+#define ELEVEN                                                                                     \
+    "SPEC_400 SPEC_430 SPEC_460 SPEC_490 SPEC_520 SPEC_550 SPEC_580 SPEC_610 SPEC_640 SPEC_670 "   \
+    "SPEC_700"
 
 static void sp_is_read_and_divided_by_its_norm(void **state)
 {
     (void)state;
     struct spectra s =
-        load("lamp.sp", SP("4", "400.0", "700.0", "50.0", FIELDS, "1", "10 20 30 40"), false);
+        load("lamp.sp",
+             SP("11", "400.0", "700.0", "50.0", ELEVEN, "1", "10 13 16 19 22 25 28 31 34 37 40"),
+             false);
     assert_int_equal(s.count, 1);
     assert_string_equal(s.names[0], "1");
     assert_near(at(&s, 0, 400), 0.2, ROUNDING);
@@ -150,14 +227,14 @@ static void sp_carries_several_named_spectra(void **state)
 {
     (void)state;
     struct spectra s = load("chart.sp",
-                            SP("3", "400.0", "600.0", "1",
-                               "SAMPLE_ID SPEC_400 SPEC_500 SPEC_600", "2",
-                               "A1 0.1 0.2 0.3\nB2 0.4 0.5 0.6"),
+                            SP("11", "400.0", "700.0", "1", "SAMPLE_ID " ELEVEN, "2",
+                               "A1 0 .1 .1 .1 .1 .1 .1 .1 .1 .1 .1\n"
+                               "B2 0 .4 .4 .4 .5 .5 .5 .5 .5 .5 .6"),
                             true);
     assert_int_equal(s.count, 2);
     assert_string_equal(s.names[0], "A1");
     assert_string_equal(s.names[1], "B2");
-    assert_near(at(&s, 1, 500), 0.5, ROUNDING);
+    assert_near(at(&s, 1, 550), 0.5, ROUNDING);
     assert_near(at(&s, 1, 830), 0.6, ROUNDING);
     spectra_fini(&s);
 }
@@ -166,10 +243,17 @@ static void sp_carries_several_named_spectra(void **state)
 static void sp_wavelengths_come_from_the_header(void **state)
 {
     (void)state;
-    struct spectra s = load("third.sp",
-                            SP("4", "400.0", "410.0", "1", "SPEC_400 SPEC_403 SPEC_407 SPEC_410",
-                               "1", "0 1 2 3"),
-                            false);
+    char text[4096];
+    size_t used = (size_t)sprintf(text, "SPECT\nSPECTRAL_BANDS 91\nSPECTRAL_START_NM 400.0\n"
+                                        "SPECTRAL_END_NM 700.0\nSPECTRAL_NORM 1\n"
+                                        "BEGIN_DATA_FORMAT\n");
+    for (int i = 0; i <= 90; i++)
+        used += (size_t)sprintf(text + used, "SPEC_%.0f ", 400 + i / 0.3);
+    used += (size_t)sprintf(text + used, "\nEND_DATA_FORMAT\nBEGIN_DATA\n");
+    for (int i = 0; i <= 90; i++)
+        used += (size_t)sprintf(text + used, "%d ", i);
+    strcpy(text + used, "\nEND_DATA\n");
+    struct spectra s = load("third.sp", text, false);
     assert_near(at(&s, 0, 402), 0.6, 1e-9); // on the straight line, through cubics
     spectra_fini(&s);
 }
@@ -197,6 +281,12 @@ static void sp_that_contradicts_itself_is_refused(void **state)
     refused("i.sp", SP("4", "400", "700", "1", "SPEC_400 SPEC_500 SPEC_x SPEC_700", "1",
                        "10 20 30 40"),
             false, "SPEC_x", "wavelength");
+    refused("l.sp", SP("4", "400", "700", "1", "SPEC_400 SPEC_nan SPEC_600 SPEC_700", "1",
+                       "10 20 30 40"),
+            false, "SPEC_nan", "whole nanometres");
+    refused("m.sp", SP("4", "400", "700", "1", "SPEC_0x190 SPEC_500 SPEC_600 SPEC_700", "1",
+                       "10 20 30 40"),
+            false, "SPEC_0x190", "whole nanometres");
     refused("j.sp", SP("0", "400", "700", "1", "A B C D", "1", "10 20 30 40"), false, "0 SPEC_",
             "at least 2");
     refused("k.sp", SP("4", "400", "700", "1", FIELDS, "1", "10 20 nan 40"), false, "k.sp", "nan");
@@ -221,7 +311,7 @@ static void a_lamp_is_a_cie_name_or_a_file(void **state)
     assert_true(lamp_spectrum("FL3.15", &lamp, NULL));
     assert_true(illuminant("FL3.15", &cie, NULL));
     assert_memory_equal(&lamp, &cie, sizeof cie);
-    assert_true(lamp_spectrum(file("x.csv", "400,1\n700,4\n"), &lamp, NULL));
+    assert_true(lamp_spectrum(file("x.csv", "400,2\n700,2\n"), &lamp, NULL));
     assert_near(lamp.v[500 - 360], 2, ROUNDING);
     assert_false(lamp_spectrum(file("x.csv", "400,0\n700,0\n"), &lamp, &err));
     unlink(path);
@@ -231,6 +321,27 @@ static void a_lamp_is_a_cie_name_or_a_file(void **state)
     assert_int_equal(err.code, ERROR_CONFIG);
     assert_true(spectra_is_path("./A") && spectra_is_path("lamp.CSV") && spectra_is_path("l.sp"));
     assert_false(spectra_is_path("FL3.15") || spectra_is_path("D65"));
+}
+
+static void a_file_in_the_current_folder_needs_no_path(void **state)
+{
+    (void)state;
+    struct spectrum lamp, cie;
+    struct error err = {0};
+    char *before = getcwd(NULL, 0);
+    file("lamp.txt", "400 2\n700 2\n");
+    assert_int_equal(chdir(folder), 0);
+    assert_true(spectra_is_path("lamp.txt"));
+    assert_true(lamp_spectrum("lamp.txt", &lamp, &err));
+    assert_near(lamp.v[500 - 360], 2, ROUNDING);
+    assert_int_equal(rename("lamp.txt", "D65"), 0); // a CIE name stays one
+    assert_true(lamp_spectrum("D65", &lamp, NULL) && illuminant("D65", &cie, NULL));
+    assert_memory_equal(&lamp, &cie, sizeof cie);
+    unlink("D65");
+    assert_false(lamp_spectrum("lamp.txt", &lamp, &err));
+    assert_non_null(strstr(err.text, "./lamp.txt"));
+    assert_int_equal(chdir(before), 0);
+    free(before);
 }
 
 // ---- real lamps --------------------------------------------------------------
@@ -295,12 +406,17 @@ int main(void)
         cmocka_unit_test(csv_with_and_without_names_is_read),
         cmocka_unit_test(noise_of_an_instrument_is_kept),
         cmocka_unit_test(csv_that_makes_no_sense_is_refused),
+        cmocka_unit_test(a_range_that_misses_visible_light_is_refused),
+        cmocka_unit_test(few_samples_tell_an_even_spectrum_only),
+        cmocka_unit_test(reflectances_have_bounds),
+        cmocka_unit_test(powers_of_no_unit_are_refused),
         cmocka_unit_test(sp_is_read_and_divided_by_its_norm),
         cmocka_unit_test(sp_carries_several_named_spectra),
         cmocka_unit_test(sp_wavelengths_come_from_the_header),
         cmocka_unit_test(sp_that_contradicts_itself_is_refused),
         cmocka_unit_test(a_missing_file_is_named),
         cmocka_unit_test(a_lamp_is_a_cie_name_or_a_file),
+        cmocka_unit_test(a_file_in_the_current_folder_needs_no_path),
         cmocka_unit_test(booth_lamps_that_contradict_themselves_are_refused_a_sound_one_loads),
         cmocka_unit_test(real_lamps_have_their_temperatures),
     };
