@@ -95,7 +95,7 @@ static bool write_shapes(const char *path, const struct derived *d, struct error
         return false;
     fputs(TABLE_HEAD, file.stream);
     fputs("// Gaussian bands, centres and standard deviations in nm, that leave the least\n"
-          "// CIEDE2000 over the training reflectances and a dozen lamps; rms is what they leave.\n"
+          "// CIEDE2000 over the training reflectances and nine lamps; rms is what they leave.\n"
           "#include \"colorimetry/tables/bands.h\"\n\n"
           "const struct band_shapes BAND_SHAPES[BANDS_MOST - BANDS_LEAST + 1] = {",
           file.stream);

@@ -15,7 +15,7 @@ bool band_training_derive(const struct reflectances *r, struct band_training *ou
                           double samples[BASIS_VECTORS][BASIS_SAMPLES], struct error *err);
 
 // Centres and widths with the least sum of squared linearised CIEDE2000 over
-// the training's rows and a dozen lamps (daylight and tungsten in full,
+// the training's rows and nine lamps (daylight and tungsten in full,
 // fluorescent and LED lamps less), each lamp with its own adapted matrix
 // (variable projection). Several starts, the best one wins; sorted by centre.
 // *rms is the residual over rows and lamps.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// boothcal: measure, fit, teach, verify, report.
+// boothcal: colours, a display's model, bands, and a session from bare settings to its report.
 #include <stdio.h>
 #include <string.h>
 

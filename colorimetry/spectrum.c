@@ -248,23 +248,6 @@ bool spectrum_from_samples(const double *nm, const double *values, size_t count,
     return true;
 }
 
-void spectrum_bin(const struct spectrum *in, const double *edges, size_t count, double *out)
-{
-    for (size_t b = 0; b < count; b++) {
-        double low = edges[b], high = edges[b + 1], sum = 0;
-        long from = (long)floor(low + 0.5) - SPECTRUM_FIRST_NM;
-        long to = (long)floor(high + 0.5) - SPECTRUM_FIRST_NM;
-        from = from < 0 ? 0 : from;
-        to = to >= SPECTRUM_COUNT ? SPECTRUM_COUNT - 1 : to;
-        for (long g = from; g <= to; g++) {
-            double bin_low = (double)(SPECTRUM_FIRST_NM + g) - 0.5;
-            double overlap = fmin(high, bin_low + 1) - fmax(low, bin_low);
-            sum += fmax(overlap, 0) * in->v[g];
-        }
-        out[b] = high > low ? sum / (high - low) : 0;
-    }
-}
-
 double spectrum_sum(const struct spectrum *s)
 {
     double sum = 0;

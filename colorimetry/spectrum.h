@@ -33,10 +33,6 @@ struct spectrum {
 bool spectrum_from_samples(const double *nm, const double *values, size_t count, bool held,
                            struct spectrum *out, struct error *err);
 
-// Mean over bins [edges[i], edges[i+1]] of a spectrum taken as constant within
-// each 1 nm bin; edges ascending, count + 1 of them.
-void spectrum_bin(const struct spectrum *in, const double *edges, size_t count, double *out);
-
 double spectrum_sum(const struct spectrum *s);
 void spectrum_scale(struct spectrum *s, double k);
 

@@ -26,18 +26,11 @@ static bool size_from(const struct exr *image, const char *name, double settings
 
 static bool take_pixels(const float *pixels, size_t count, struct luminance_map *map)
 {
-    double below = 0;
     map->luminance = malloc(count * sizeof *map->luminance);
     if (!map->luminance)
         return false;
-    for (size_t i = 0; i < count; i++) {
+    for (size_t i = 0; i < count; i++)
         map->luminance[i] = pixels[i] > 0 ? pixels[i] : 0;
-        if (pixels[i] < 0) {
-            map->negative++;
-            below += pixels[i];
-        }
-    }
-    map->negative_mean = map->negative ? below / map->negative : 0;
     return true;
 }
 

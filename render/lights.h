@@ -18,15 +18,14 @@ struct ceiling {
 // (least z), column 0 the left edge (least x).
 struct luminance_map {
     struct ceiling ceiling;
-    int width, height;    // 1..16384
-    double *luminance;    // owned
-    long negative;        // pixels that were below zero (camera noise) and set to 0
-    double negative_mean; // their mean, cd/m2: the bias that clipping left
+    int width, height; // 1..16384
+    double *luminance; // owned
 };
 
 // From an EXR with channel "Y" (cd/m2). Size in metres from the attributes
 // boothd.width_m and boothd.depth_m when present (they must agree with
-// ceiling within 1 %), else from ceiling. Error DATA without "Y".
+// ceiling within 1 %), else from ceiling. What camera noise put below zero is
+// set to 0. Error DATA without "Y".
 bool luminance_map_load(const char *path, const struct ceiling *ceiling, struct luminance_map *map,
                         struct error *err);
 void luminance_map_fini(struct luminance_map *map);

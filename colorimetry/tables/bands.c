@@ -2,7 +2,7 @@
 // Written by: boothcal bands optimise --basis reflectance_basis.c -o bands.c
 // clang-format off
 // Gaussian bands, centres and standard deviations in nm, that leave the least
-// CIEDE2000 over the training reflectances and a dozen lamps; rms is what they leave.
+// CIEDE2000 over the training reflectances and nine lamps; rms is what they leave.
 #include "colorimetry/tables/bands.h"
 
 const struct band_shapes BAND_SHAPES[BANDS_MOST - BANDS_LEAST + 1] = {

@@ -290,26 +290,6 @@ static void spectra_that_make_no_sense_are_refused(void **state)
     }
 }
 
-static void bins_keep_energy_and_count_parts_of_a_nanometre(void **state)
-{
-    (void)state;
-    struct spectrum s;
-    for (int i = 0; i < SPECTRUM_COUNT; i++)
-        s.v[i] = spiky(360 + i);
-    const double edges[] = {359.5, 407.25, 520, 520.3, 611.1, 830.5};
-    double out[5], sum = 0;
-    spectrum_bin(&s, edges, 5, out);
-    for (int i = 0; i < 5; i++)
-        sum += out[i] * (edges[i + 1] - edges[i]);
-    assert_near(sum / spectrum_sum(&s), 1, ENERGY);
-    assert_near(out[2], at(&s, 520), ROUNDING * 300);
-    const double beyond[] = {200, 300, 359.5, 360.5, 900};
-    spectrum_bin(&s, beyond, 4, out);
-    assert_true(out[0] == 0 && out[1] == 0);
-    assert_near(out[2], s.v[0], ROUNDING * 100);
-    assert_true(isfinite(out[3]) && out[3] > 0);
-}
-
 static void scaling_scales_the_sum(void **state)
 {
     (void)state;
@@ -337,7 +317,6 @@ int main(void)
         cmocka_unit_test(a_line_between_grid_points_is_not_lost),
         cmocka_unit_test(a_spiky_lamp_read_at_0_35_nm_has_the_colour_of_its_1_nm_version),
         cmocka_unit_test(spectra_that_make_no_sense_are_refused),
-        cmocka_unit_test(bins_keep_energy_and_count_parts_of_a_nanometre),
         cmocka_unit_test(scaling_scales_the_sum),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
