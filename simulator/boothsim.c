@@ -75,59 +75,67 @@ static void catch_signals(void)
     signal(SIGPIPE, SIG_IGN);
 }
 
+enum { SCENARIO = 256, RUN, LAMP, SCRIPT, NO_XVFB, HELP_SCENARIO, HELP, VERSION };
+
+static const struct option known_options[] = {
+    {"scenario", required_argument, NULL, SCENARIO},
+    {"run", required_argument, NULL, RUN},
+    {"lamp", required_argument, NULL, LAMP},
+    {"script", required_argument, NULL, SCRIPT},
+    {"no-xvfb", no_argument, NULL, NO_XVFB},
+    {"help-scenario", no_argument, NULL, HELP_SCENARIO},
+    {"help", no_argument, NULL, HELP},
+    {"version", no_argument, NULL, VERSION},
+    {0},
+};
+
+// False when the program ends here: then *status says how.
+static bool take_option(int name, struct options *o, int *status)
+{
+    switch (name) {
+    case SCENARIO:
+        o->scenario = optarg;
+        return true;
+    case RUN:
+        o->run = optarg;
+        return true;
+    case LAMP:
+        if (o->lamp_count < LAMP_OPTIONS_MOST) {
+            o->lamps[o->lamp_count++] = optarg;
+            return true;
+        }
+        fprintf(stderr, "boothsim: more than %d times --lamp\n", LAMP_OPTIONS_MOST);
+        *status = EXIT_USAGE;
+        return false;
+    case SCRIPT:
+        o->script = optarg;
+        return true;
+    case NO_XVFB:
+        o->xvfb = false;
+        return true;
+    case HELP_SCENARIO:
+        scenario_describe(stdout);
+        return false;
+    case HELP:
+        fputs(usage, stdout);
+        return false;
+    case VERSION:
+        puts("boothsim " BOOTHD_VERSION);
+        return false;
+    default:
+        *status = EXIT_USAGE;
+        return false;
+    }
+}
+
 // Ends the program for --help and the like: then *status says how.
 static bool parse_options(int argc, char **argv, struct options *o, int *status)
 {
-    enum { SCENARIO = 256, RUN, LAMP, SCRIPT, NO_XVFB, HELP_SCENARIO, HELP, VERSION };
-    static const struct option known[] = {
-        {"scenario", required_argument, NULL, SCENARIO},
-        {"run", required_argument, NULL, RUN},
-        {"lamp", required_argument, NULL, LAMP},
-        {"script", required_argument, NULL, SCRIPT},
-        {"no-xvfb", no_argument, NULL, NO_XVFB},
-        {"help-scenario", no_argument, NULL, HELP_SCENARIO},
-        {"help", no_argument, NULL, HELP},
-        {"version", no_argument, NULL, VERSION},
-        {0},
-    };
     *o = (struct options){.xvfb = true};
     *status = EXIT_SUCCESS;
-    for (int c; (c = getopt_long(argc, argv, "+", known, NULL)) != -1;) {
-        switch (c) {
-        case SCENARIO:
-            o->scenario = optarg;
-            break;
-        case RUN:
-            o->run = optarg;
-            break;
-        case LAMP:
-            if (o->lamp_count == LAMP_OPTIONS_MOST) {
-                fprintf(stderr, "boothsim: more than %d times --lamp\n", LAMP_OPTIONS_MOST);
-                *status = EXIT_USAGE;
-                return false;
-            }
-            o->lamps[o->lamp_count++] = optarg;
-            break;
-        case SCRIPT:
-            o->script = optarg;
-            break;
-        case NO_XVFB:
-            o->xvfb = false;
-            break;
-        case HELP_SCENARIO:
-            scenario_describe(stdout);
+    for (int c; (c = getopt_long(argc, argv, "+", known_options, NULL)) != -1;)
+        if (!take_option(c, o, status))
             return false;
-        case HELP:
-            fputs(usage, stdout);
-            return false;
-        case VERSION:
-            puts("boothsim " BOOTHD_VERSION);
-            return false;
-        default:
-            *status = EXIT_USAGE;
-            return false;
-        }
-    }
     if (optind < argc)
         o->command = argv + optind;
     if (o->scenario && o->run)

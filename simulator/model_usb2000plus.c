@@ -355,6 +355,38 @@ static size_t payload_of(uint8_t command)
     }
 }
 
+// Commands that are answered.
+static int answer(struct usb2000plus *d, const uint8_t *bytes, int64_t now_ns)
+{
+    uint8_t blank[60];
+    switch (bytes[0]) {
+    case READ_SLOT:
+        read_slot(d, bytes[1]);
+        return 0;
+    case REQUEST_SPECTRUM:
+        if (d->powered && d->requests < 2)
+            d->requests++;
+        start_if_idle(d, now_ns);
+        return 0;
+    case READ_REGISTER:
+        read_register(d, bytes[1]);
+        return 0;
+    case READ_TEMPERATURE:
+        read_temperature(d, now_ns);
+        return 0;
+    case READ_IRRADIANCE:
+        memset(blank, 0xFF, sizeof(blank));
+        reply(d, blank, sizeof(blank));
+        return 0;
+    case STATUS:
+        read_status(d);
+        return 0;
+    default:
+        d->halted = true;
+        return -EPIPE;
+    }
+}
+
 static int execute(struct usb2000plus *d, const uint8_t *bytes, size_t size, int64_t now_ns)
 {
     switch (bytes[0]) {
@@ -372,16 +404,8 @@ static int execute(struct usb2000plus *d, const uint8_t *bytes, size_t size, int
         if (!d->powered)
             stop(d);
         return 0;
-    case READ_SLOT:
-        read_slot(d, bytes[1]);
-        return 0;
     case WRITE_SLOT:
         write_slot(d, bytes, size);
-        return 0;
-    case REQUEST_SPECTRUM:
-        if (d->powered && d->requests < 2)
-            d->requests++;
-        start_if_idle(d, now_ns);
         return 0;
     case SET_TRIGGER:
         set_trigger(d, little(bytes + 1, 2), now_ns);
@@ -390,24 +414,8 @@ static int execute(struct usb2000plus *d, const uint8_t *bytes, size_t size, int
         if (bytes[1] != REGISTER_VERSION && bytes[1] != REGISTER_PROGRAMMED)
             d->registers[bytes[1]] = (uint16_t)little(bytes + 2, 2);
         return 0;
-    case READ_REGISTER:
-        read_register(d, bytes[1]);
-        return 0;
-    case READ_TEMPERATURE:
-        read_temperature(d, now_ns);
-        return 0;
-    case READ_IRRADIANCE: {
-        uint8_t blank[60];
-        memset(blank, 0xFF, sizeof(blank));
-        reply(d, blank, sizeof(blank));
-        return 0;
-    }
-    case STATUS:
-        read_status(d);
-        return 0;
     default:
-        d->halted = true;
-        return -EPIPE;
+        return answer(d, bytes, now_ns);
     }
 }
 
