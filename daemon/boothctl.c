@@ -6,12 +6,20 @@
 #include "config/booth.h"
 #include "daemon/ctl.h"
 
-enum { EXIT_FINE = 0, EXIT_FAILED = 1, EXIT_BAD_INPUT = 2, EXIT_WARNED = 3 };
+enum { EXIT_FINE = 0, EXIT_FAILED = 1, EXIT_WARNED = 3 };
 
 static int give_up(const struct error *err)
 {
     log_line(LOG_LEVEL_ERROR, "%s", err->text);
-    return err->code == ERROR_CONFIG || err->code == ERROR_RANGE ? EXIT_BAD_INPUT : EXIT_FAILED;
+    return error_exit_code(err);
+}
+
+static int finish(int code)
+{
+    if (!fflush(stdout) && !ferror(stdout))
+        return code;
+    log_line(LOG_LEVEL_ERROR, "standard output cannot be written");
+    return EXIT_FAILED;
 }
 
 static json_t *ask(struct ctl *c, struct error *err)
@@ -38,7 +46,7 @@ int main(int argc, char **argv)
         return give_up(&err);
     if (c.help || c.version) {
         printf("%s", c.help ? ctl_help : "boothctl " BOOTHD_VERSION "\n");
-        return EXIT_FINE;
+        return finish(EXIT_FINE);
     }
     json_t *reply = ask(&c, &err);
     if (!reply)
@@ -50,5 +58,5 @@ int main(int argc, char **argv)
         ctl_print(c.what, reply, stdout);
     fputs(c.json ? "\n" : "", stdout);
     json_decref(reply);
-    return fflush(stdout) ? EXIT_FAILED : warned ? EXIT_WARNED : EXIT_FINE;
+    return finish(warned ? EXIT_WARNED : EXIT_FINE);
 }

@@ -18,7 +18,7 @@
 #include "daemon/serve.h"
 #include "drivers/udev.h"
 
-enum { EXIT_FINE = 0, EXIT_FAILED = 1, EXIT_BAD_INPUT = 2, EXIT_MISSING = 3 };
+enum { EXIT_FINE = 0, EXIT_FAILED = 1, EXIT_MISSING = 3 };
 enum { TICK_MS = 20 };
 
 static const int64_t STOP_WITHIN_NS = 1500 * NS_PER_MS;
@@ -36,14 +36,13 @@ struct service {
     char since[21];
     char complaint[512]; // last frame error logged
     bool stop;
+    int code; // to end with
 };
 
 static int exit_code(const struct error *err)
 {
     log_line(LOG_LEVEL_ERROR, "%s", err->text);
-    return err->code == ERROR_CONFIG || err->code == ERROR_RANGE || err->code == ERROR_DATA
-               ? EXIT_BAD_INPUT
-               : EXIT_FAILED;
+    return error_exit_code(err);
 }
 
 static bool catch_signals(struct service *s, struct error *err)
@@ -162,13 +161,8 @@ static bool start(struct service *s, struct error *err)
 // driver is left behind: the program ends in any case.
 static bool stop(struct service *s)
 {
-    struct job job;
     int64_t deadline_ns = clock_now_ns() + STOP_WITHIN_NS;
     notify_stopping();
-    while (s->jobs && jobs_take(s->jobs, &job)) {
-        fail(&job.err, ERROR_GONE, "boothd is stopping");
-        jobs_finish(s->jobs, &job);
-    }
     serve_stop(s->serve);
     bool clean = desk_close(s->desk, deadline_ns);
     if (!clean || !acquire_stop(s->booth.instruments, deadline_ns)) {
@@ -229,9 +223,13 @@ static void loop(struct service *s)
         take_signals(s);
         do_jobs(s);
         complain(s, draw(s, false, &err), &err);
-        notify_alive(&s->notifier, clock_now_ns());
+        notify_alive(&s->notifier, clock_now_ns(), !s->booth.blind);
         if (!renderer_events(s->booth.renderer, 0))
             s->stop = true;
+        if (serve_ended(s->serve)) {
+            s->stop = true;
+            s->code = EXIT_FAILED;
+        }
     }
 }
 
@@ -239,34 +237,50 @@ static int run(struct boothd_options *options)
 {
     static struct service s; // too large for a stack, and one per program
     struct error err = {0};
-    int code = EXIT_FINE;
     s = (struct service){.options = *options, .signals = -1};
     s.options.source.path = s.options.config;
     if (start(&s, &err))
         loop(&s);
     else
-        code = exit_code(&err);
+        s.code = exit_code(&err);
     if (!stop(&s))
-        _exit(code);
-    return code;
+        _exit(s.code);
+    return s.code;
 }
 
 static bool check_calibration(const struct booth_settings *b, struct error *err)
 {
     const char *calibration = b->spectrometer.options.calibration;
     return !booth_spectrometer(b) || !*calibration || path_exists(calibration) ||
-           fail(err, ERROR_CONFIG, "[spectrometer] calibration: %s is not there", calibration);
+           fail(err, ERROR_CONFIG, "[spectrometer] calibration = %s: is not there", calibration);
 }
 
-static int check(const struct setup_source *source)
+// A socket that no --socket replaces; without one the session decides.
+static bool check_socket(const struct boothd_options *o, const struct booth_settings *b,
+                         struct error *err)
 {
+    char folder[sizeof b->control.socket];
+    snprintf(folder, sizeof folder, "%s", *o->socket ? "" : b->control.socket);
+    char *slash = strrchr(folder, '/');
+    if (!slash)
+        return true;
+    slash[slash == folder] = 0;
+    return !access(folder, W_OK | X_OK) || fail(err, ERROR_CONFIG, "[control] socket = %s: %s: %s",
+                                                b->control.socket, folder, strerror(errno));
+}
+
+static int check(const struct boothd_options *options)
+{
+    const struct setup_source *source = &options->source;
     struct error err = {0};
     struct setup *setup;
     char text[256];
     int missing = 0;
     if (!setup_load(source, &setup, &err))
         return exit_code(&err);
-    bool fine = check_calibration(&setup->settings, &err);
+    bool fine = (check_calibration(&setup->settings, &err) &&
+                 check_socket(options, &setup->settings, &err)) ||
+                while_doing(&err, "%s", source->path);
     for (; setup_warning(setup, missing, text, sizeof text); missing++)
         printf("%s\n", text);
     printf("%s: %d lamps, %s\n", source->path, setup->lamps.count,
@@ -275,20 +289,13 @@ static int check(const struct setup_source *source)
     return !fine ? exit_code(&err) : missing ? EXIT_MISSING : EXIT_FINE;
 }
 
-int main(int argc, char **argv)
+static int perform(struct boothd_options *options)
 {
-    struct boothd_options options;
-    struct error err = {0};
-    log_init("boothd", LOG_LEVEL_INFO);
-    if (!options_parse(argc, argv, getenv("XDG_CONFIG_HOME"), getenv("HOME"), &options, &err))
-        return exit_code(&err);
-    log_init("boothd", options.verbose ? LOG_LEVEL_DEBUG : LOG_LEVEL_INFO);
-    options.source.path = options.config;
-    switch (options.mode) {
+    switch (options->mode) {
     case MODE_RUN:
-        return run(&options);
+        return run(options);
     case MODE_CHECK:
-        return check(&options.source);
+        return check(options);
     case MODE_DESCRIBE:
         booth_describe(stdout);
         return EXIT_FINE;
@@ -305,5 +312,21 @@ int main(int argc, char **argv)
         fputs(boothd_help, stdout);
         return EXIT_FINE;
     }
+    return EXIT_FAILED;
+}
+
+int main(int argc, char **argv)
+{
+    struct boothd_options options;
+    struct error err = {0};
+    log_init("boothd", LOG_LEVEL_INFO);
+    if (!options_parse(argc, argv, getenv("XDG_CONFIG_HOME"), getenv("HOME"), &options, &err))
+        return exit_code(&err);
+    log_init("boothd", options.verbose ? LOG_LEVEL_DEBUG : LOG_LEVEL_INFO);
+    options.source.path = options.config;
+    int code = perform(&options);
+    if (!fflush(stdout) && !ferror(stdout))
+        return code;
+    log_line(LOG_LEVEL_ERROR, "standard output cannot be written");
     return EXIT_FAILED;
 }

@@ -79,7 +79,9 @@ static bool parse_patch(const json_t *request, struct job *job, struct error *er
     for (int i = 0; i < 3; i++) {
         const json_t *value = json_array_get(rgb, i);
         v[i] = json_number_value(value);
-        if (!json_is_number(value) || !(v[i] >= 0 && v[i] <= 1))
+        if (!json_is_number(value))
+            return fail(err, ERROR_RANGE, "rgb: number %d must be a number, 0..1", i + 1);
+        if (!(v[i] >= 0 && v[i] <= 1))
             return fail(err, ERROR_RANGE, "rgb: number %d: %g is outside 0..1", i + 1, v[i]);
     }
     job->counts = (struct counts){v[0], v[1], v[2]};

@@ -196,21 +196,53 @@ static bool make_request(const struct words *w, struct ctl *c, struct error *err
                     : fail(err, ERROR_RANGE, "%s: not valid UTF-8", command->name);
 }
 
-bool ctl_parse(int argc, char **argv, struct ctl *c, struct error *err)
+// "-0.1" is a number, though getopt would look for options in it: it is shown
+// the text behind the sign, and what it gives back is looked up again.
+static bool is_negative(const char *text)
 {
-    struct words words = {0};
+    const char *end;
+    double value;
+    return *text == '-' && number_parse(text, &end, &value) && !*end;
+}
+
+static const char *with_sign(char **given, int count, const char *text)
+{
+    for (int i = 0; text && i < count; i++)
+        if (text == given[i] + 1 && is_negative(given[i]))
+            return given[i];
+    return text;
+}
+
+static bool take_all(int argc, char **given, char **argv, struct words *words, struct ctl *c,
+                     struct error *err)
+{
     int option;
-    *c = (struct ctl){0};
     optind = 0; // getopt starts anew, so that tests may call this twice
     opterr = 0;
     while ((option = getopt_long(argc, argv, "", long_options, NULL)) != -1)
-        if (!take_option(option, optarg, &words, c, err))
+        if (!take_option(option, with_sign(given, argc, optarg), words, c, err))
             return false;
     for (; optind < argc; optind++) {
-        if (words.count == 8)
+        if (words->count == 8)
             return fail(err, ERROR_CONFIG, "too many arguments; see boothctl --help");
-        words.of[words.count++] = argv[optind];
+        words->of[words->count++] = with_sign(given, argc, argv[optind]);
     }
+    return true;
+}
+
+bool ctl_parse(int argc, char **argv, struct ctl *c, struct error *err)
+{
+    struct words words = {0};
+    char **shown = calloc((size_t)argc + 1, sizeof *shown);
+    *c = (struct ctl){0};
+    if (!shown)
+        return fail(err, ERROR_SYSTEM, "no memory for the arguments");
+    for (int i = 0; i < argc; i++)
+        shown[i] = argv[i] + is_negative(argv[i]);
+    bool fine = take_all(argc, argv, shown, &words, c, err);
+    free(shown);
+    if (!fine)
+        return false;
     return c->help || c->version || make_request(&words, c, err);
 }
 

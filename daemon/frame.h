@@ -12,16 +12,20 @@ struct booth {
     struct setup *setup;
     struct renderer *renderer;
     struct estimator estimator;
-    struct state state;  // believed now
-    struct state shown;  // of the last frame drawn
-    struct scene scene;  // of the last frame, pointers into setup
-    uint64_t frames;     // drawn since the start
-    double out_of_gamut; // share of the last frame drawn, 0..1
+    struct state state;   // believed now
+    struct state shown;   // of the last frame drawn
+    struct scene scene;   // of the last frame, pointers into setup
+    uint64_t frames;      // drawn since the start
+    double out_of_gamut;  // share of the last frame drawn, 0..1
+    struct error failure; // why what should be shown is not; code NONE while it is
+    int64_t again_ns;     // when that is tried again
+    bool blind;           // not even black could be drawn
 };
 
 // One frame: asks the instruments' mailboxes, estimates, and draws when
-// something changed that can be seen, or when forced. On failure the screen
-// keeps the last frame.
+// something changed that can be seen, or when forced. What cannot be shown
+// leaves the screen black, for the last frame would be a wrong proof; the
+// failure is kept, and the same is tried again after a second or when forced.
 bool frame(struct booth *booth, int64_t now_ns, bool force, struct error *err);
 
 // What of `now` differs visibly from `shown`: another lamp, its level by more

@@ -7,6 +7,8 @@
 
 #include "base/clock.h"
 
+static const int64_t BLIND_MOST_NS = 5 * NS_PER_S;
+
 void notify_init(struct notifier *n)
 {
     uint64_t patience_us = 0;
@@ -28,9 +30,11 @@ void notify_line(struct notifier *n, const char *line)
     sd_notifyf(0, "STATUS=%s", n->line);
 }
 
-void notify_alive(struct notifier *n, int64_t now_ns)
+void notify_alive(struct notifier *n, int64_t now_ns, bool drawing)
 {
-    if (!n->every_ns || now_ns < n->next_ns)
+    if (drawing || !n->drawn_ns)
+        n->drawn_ns = now_ns;
+    if (!n->every_ns || now_ns < n->next_ns || now_ns - n->drawn_ns > BLIND_MOST_NS)
         return;
     n->next_ns = now_ns + n->every_ns;
     sd_notify(0, "WATCHDOG=1");

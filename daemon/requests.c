@@ -125,24 +125,41 @@ static void keep_given(const struct booth_settings *old, struct booth_settings *
         }
 }
 
+// The old setup takes over from the new one again; no generation comes twice.
+static void take_back(struct booth *b, struct setup *old, const struct estimator *before,
+                      int64_t now_ns)
+{
+    old->generations = b->setup->generations;
+    forget_frame(b);
+    setup_free(b->setup);
+    b->setup = old;
+    b->estimator = *before;
+    frame(b, now_ns, true, NULL);
+}
+
 bool booth_reload(struct booth *b, const struct setup_source *source, int64_t now_ns,
                   json_t **restart, struct error *err)
 {
-    struct setup *next;
+    struct setup *next, *old = b->setup;
+    struct estimator before = b->estimator;
     struct classifier taught;
-    if (!setup_reload(source, b->setup, &next, err))
+    if (!setup_reload(source, old, &next, err))
         return while_doing(err, "reload");
     json_t *changed = json_array();
-    keep_given(&b->setup->settings, &next->settings, changed);
+    keep_given(&old->settings, &next->settings, changed);
     forget_frame(b);
-    setup_free(b->setup);
     b->setup = next;
     lamps_teach(&next->lamps, &taught);
     estimator_change(&b->estimator, &next->settings, &taught);
-    if (restart)
+    bool fine = frame(b, now_ns, true, err) || while_doing(err, "reload");
+    if (fine)
+        setup_free(old);
+    else
+        take_back(b, old, &before, now_ns);
+    if (restart && fine)
         *restart = json_incref(changed);
     json_decref(changed);
-    return frame(b, now_ns, true, err);
+    return fine;
 }
 
 static void reload(struct booth *b, const struct setup_source *source, struct job *job,

@@ -13,7 +13,8 @@ void request_do(struct booth *booth, const struct setup_source *source, struct j
 
 // Loads everything again and shows it. *restart (may be NULL) receives an
 // array of the settings that changed but count only after a restart; these
-// keep their old values. Nothing changes on failure.
+// keep their old values. When something cannot be loaded, or not be shown, all
+// stays as it was.
 bool booth_reload(struct booth *booth, const struct setup_source *source, int64_t now_ns,
                   json_t **restart, struct error *err);
 

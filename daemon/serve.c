@@ -15,8 +15,8 @@ struct serve {
     struct snapshot snapshot; // of the control thread
     int open;                 // jobs passed on and not yet answered
     pthread_t thread;
-    pthread_mutex_t lock; // of stop
-    bool stop;
+    pthread_mutex_t lock; // of stop and ended
+    bool stop, ended;
 };
 
 static bool stopping(struct serve *s)
@@ -77,9 +77,31 @@ static void *work(void *argument)
         answer_finished(s, s->with.main_jobs);
         answer_finished(s, desk_jobs(s->with.desk));
     }
-    if (!fine)
-        log_line(LOG_LEVEL_ERROR, "control socket: %s", err.text);
+    if (fine)
+        return NULL;
+    log_line(LOG_LEVEL_ERROR, "control socket: %s", err.text);
+    pthread_mutex_lock(&s->lock);
+    s->ended = true;
+    pthread_mutex_unlock(&s->lock);
     return NULL;
+}
+
+bool serve_ended(struct serve *s)
+{
+    pthread_mutex_lock(&s->lock);
+    bool ended = s->ended;
+    pthread_mutex_unlock(&s->lock);
+    return ended;
+}
+
+// What nobody will work on any more.
+static void refuse_waiting(struct jobs *jobs)
+{
+    struct job job;
+    while (jobs_take(jobs, &job)) {
+        fail(&job.err, ERROR_GONE, "boothd is stopping");
+        jobs_finish(jobs, &job);
+    }
 }
 
 struct serve *serve_start(const char *path, const struct serve_with *with, struct error *err)
@@ -110,7 +132,10 @@ void serve_stop(struct serve *s)
     s->stop = true;
     pthread_mutex_unlock(&s->lock);
     pthread_join(s->thread, NULL);
+    refuse_waiting(s->with.main_jobs);
+    refuse_waiting(desk_jobs(s->with.desk));
     answer_finished(s, s->with.main_jobs);
+    answer_finished(s, desk_jobs(s->with.desk));
     control_unlisten(s->server);
     pthread_mutex_destroy(&s->lock);
     free(s);

@@ -22,7 +22,12 @@ struct serve;
 // Listens at path and starts the thread. NULL with err.
 struct serve *serve_start(const char *path, const struct serve_with *with, struct error *err);
 
-// Answers what was finished, ends the thread, removes the socket. Accepts NULL.
+// Whether the thread has given up, because its sockets could not be waited on:
+// then nobody can reach the program any more. Any thread.
+bool serve_ended(struct serve *serve);
+
+// Ends the thread, answers what was finished, refuses what still waits (GONE),
+// removes the socket. Accepts NULL.
 void serve_stop(struct serve *serve);
 
 #endif

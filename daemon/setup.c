@@ -3,6 +3,7 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "config/display_file.h"
 #include "config/paths.h"
@@ -24,16 +25,24 @@ static bool declared_is_there(const struct setup *s, struct error *err)
     for (int i = 0; i < s->lamps.count; i++)
         if (!strcmp(declared, s->lamps.lamps[i].file.name))
             return true;
-    return !*declared || fail(err, ERROR_CONFIG, "[lamps] declared: \"%s\" was not taught in %s",
+    return !*declared || fail(err, ERROR_CONFIG, "[lamps] declared = %s: was not taught in %s",
                               declared, s->settings.lamps.folder);
+}
+
+static bool materials_are_there(const struct setup *s, struct error *err)
+{
+    struct stat what;
+    const char *folder = s->settings.materials.folder;
+    bool there = !*folder || (!stat(folder, &what) && S_ISDIR(what.st_mode));
+    return there || fail(err, ERROR_CONFIG, "[materials] folder = %s: is no folder", folder);
 }
 
 static bool load_lamps(struct setup *s, struct error *err)
 {
     const struct booth_settings *b = &s->settings;
     if (!path_exists(b->lamps.folder))
-        return declared_is_there(s, err);
-    if (!lamps_load(b->lamps.folder, &s->lamps, err) || !declared_is_there(s, err))
+        return true;
+    if (!lamps_load(b->lamps.folder, &s->lamps, err))
         return false;
     s->lights = calloc(s->lamps.count + 1, sizeof *s->lights);
     if (!s->lights)
@@ -68,8 +77,16 @@ static bool show_again(struct setup *s, const struct setup *old, struct error *e
     if (old && old->show == SHOW_PATCH)
         setup_patch(s, old->counts);
     if (!old && *s->settings.materials.show)
-        return setup_show(s, s->settings.materials.show, "", err);
+        return setup_show(s, s->settings.materials.show, "", err) ||
+               while_doing(err, "[materials] show");
     return true;
+}
+
+// Settings that name what is not there; path is theirs.
+static bool consistent(const struct setup *s, const char *path, struct error *err)
+{
+    return (declared_is_there(s, err) && materials_are_there(s, err)) ||
+           while_doing(err, "%s", path);
 }
 
 bool setup_reload(const struct setup_source *source, const struct setup *old, struct setup **out,
@@ -81,7 +98,9 @@ bool setup_reload(const struct setup_source *source, const struct setup *old, st
     s->baked_lamp = -1;
     s->generations = old ? old->generations : 0;
     if (booth_load(source->path, source->overrides, source->override_count, &s->settings, err) &&
-        booth_bands(&s->settings, &s->bands, err) && load_display(s, err) && load_lamps(s, err) && show_again(s, old, err)) {
+        booth_bands(&s->settings, &s->bands, err) && load_display(s, err) && load_lamps(s, err) &&
+        consistent(s, source->path, err) &&
+        (show_again(s, old, err) || while_doing(err, "%s", source->path))) {
         *out = s;
         return true;
     }

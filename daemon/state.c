@@ -10,6 +10,8 @@ static const double LEVEL_STEP = 0.03; // a dimmer's, far above a reading's nois
 static const int LEVEL_STEP_READINGS = 2;
 static const double TILT_STEP_DEG = 0.3; // a hand's, far above a resting sensor's noise
 static const double EYE_FARTHEST_M = 10;
+static const double EYE_LAG_M = 0.05;   // at any speed
+static const double EYE_SPEED_S = 0.16; // 1 Hz, as the filter's authors recommend
 
 const char *standing_name(enum standing standing)
 {
@@ -183,6 +185,26 @@ static void take_tilt(struct estimator *e, const struct samples *seen, int64_t n
     remember(&e->tilt, &t->taken, now_ns, 1);
 }
 
+static double share_of(double dt_s, double time_constant_s)
+{
+    return time_constant_s > 0 ? -expm1(-dt_s / time_constant_s) : 1;
+}
+
+static struct vec3 towards(struct vec3 from, struct vec3 to, double share)
+{
+    return vec3_add(from, vec3_scale(vec3_sub(to, from), share));
+}
+
+static void follow_eye(struct estimator *e, struct vec3 at, double dt_s)
+{
+    double rest_s = e->limits.eye_s;
+    struct vec3 *smooth = &e->state.eye.at;
+    struct vec3 speed = vec3_scale(vec3_sub(at, *smooth), 1 / dt_s);
+    e->eye_speed = towards(e->eye_speed, speed, share_of(dt_s, EYE_SPEED_S));
+    double faster = vec3_length(e->eye_speed) * rest_s / EYE_LAG_M;
+    *smooth = towards(*smooth, at, share_of(dt_s, rest_s / (1 + faster)));
+}
+
 static void take_head(struct estimator *e, const struct samples *seen, int64_t now_ns)
 {
     const struct head_sample *h = &seen->head;
@@ -194,7 +216,13 @@ static void take_head(struct estimator *e, const struct samples *seen, int64_t n
         e->eye.usable = false;
         return;
     }
-    e->state.eye.at = at;
+    double dt_s = seconds(h->taken.latest_ns - e->eye.seen_ns);
+    if (e->eye.ever && dt_s < e->limits.eye_hold_s) {
+        follow_eye(e, at, fmax(dt_s, 0.001));
+    } else {
+        e->state.eye.at = at;
+        e->eye_speed = (struct vec3){0};
+    }
     double px = isfinite(h->reprojection_px) ? h->reprojection_px : INFINITY;
     remember(&e->eye, &h->taken, now_ns, 1 / (1 + px * px));
 }

@@ -72,8 +72,9 @@ struct estimator {
     int64_t now_ns; // of the last call
     struct memory lamp, tilt, eye;
     struct state state;
-    int level_readings; // of the lamp now on
-    int level_steps;    // readings in a row beyond LEVEL_STEP on one side, signed
+    struct vec3 eye_speed; // m/s, smoothed
+    int level_readings;    // of the lamp now on
+    int level_steps;       // readings in a row beyond LEVEL_STEP on one side, signed
 };
 
 // taught may hold no lamp; its limits come from settings.
@@ -96,7 +97,9 @@ void estimator_change(struct estimator *e, const struct booth_settings *settings
 //   and count at once.
 // - Tilt: smoothed over tilt_s while within 0.3 degrees, else taken at once;
 //   implausible samples are passed over.
-// - Eye: as seen; lost or ambiguous markers keep the last place.
+// - Eye: smoothed over eye_s at rest, the less the faster it moves, so that it
+//   lags by 5 cm at most (Casiez, Roussel, Vogel 2012, the 1 Euro filter); lost
+//   or ambiguous markers keep the last place.
 // Samples older than one already used are passed over. When now_ns goes back,
 // ages start again from 0.
 struct state estimate(struct estimator *e, const struct samples *seen, int64_t now_ns);

@@ -59,9 +59,26 @@ static void warn_of_lamp(struct snapshot *s)
     }
 }
 
+// An emulated panel has no ramp to bend.
+static void warn_of_output(struct snapshot *s)
+{
+    int bits = booth_bits(&s->settings);
+    if (s->output.bits < bits)
+        warn(s, "the window has %d bits a channel, not the %d of [display] bits", s->output.bits,
+             bits);
+    if (s->output.ramp == RAMP_BENT)
+        warn(s, "the monitor's gamma ramp is not neutral: colours are wrong");
+    if (s->output.ramp == RAMP_UNKNOWN && !s->settings.booth.emulated)
+        warn(s, "the monitor's gamma ramp is not known: it must be neutral");
+}
+
 static void warnings(const struct booth *b, struct snapshot *s)
 {
     char text[sizeof *s->warnings];
+    if (s->failure.code)
+        warn(s, "%s: %.160s", b->blind ? "nothing can be drawn" : "the screen is kept black",
+             s->failure.text);
+    warn_of_output(s);
     for (int i = 0; setup_warning(b->setup, i, text, sizeof text); i++)
         warn(s, "%s", text);
     if (booth_spectrometer(&s->settings))
@@ -96,7 +113,13 @@ static void take_setup(const struct setup *u, struct snapshot *s)
 
 void snapshot_take(struct booth *b, struct snapshot *s)
 {
-    *s = (struct snapshot){.state = b->state, .scene = b->scene.kind, .frames = b->frames};
+    *s =
+        (struct snapshot){.state = b->state,
+                          .scene = b->scene.kind,
+                          .frames = b->frames,
+                          .failure = b->failure,
+                          .matches = !b->failure.code && b->shown.lamp.index == b->state.lamp.index,
+                          .output = renderer_output(b->renderer)};
     take_setup(b->setup, s);
     snprintf(s->renderer, sizeof s->renderer, "%s", renderer_name(b->renderer));
     if (s->scene == SCENE_SURFACE)
@@ -139,6 +162,21 @@ void snapshot_line(const struct snapshot *s, char *text, size_t size)
                         : s->scene == SCENE_DARK ? "nothing"
                                                  : s->material;
     snprintf(text, size, "%s, tilt %.0f degrees, %s on screen", lamp, s->state.tilt.deg, shown);
+}
+
+static const char *ramp_name(enum display_ramp ramp)
+{
+    switch (ramp) {
+    case RAMP_NONE:
+        return "none";
+    case RAMP_UNKNOWN:
+        return "unknown";
+    case RAMP_NEUTRAL:
+        return "neutral";
+    case RAMP_BENT:
+        return "not neutral";
+    }
+    return "unknown";
 }
 
 static json_t *text_or_null(const char *text)
@@ -216,8 +254,8 @@ static bool believed(const struct belief *b)
 
 static bool valid(const struct snapshot *s)
 {
-    return s->scene == SCENE_SURFACE && s->state.lamp.verdict == LAMP_KNOWN &&
-           believed(&s->state.lamp.belief) &&
+    return s->scene == SCENE_SURFACE && s->matches && s->output.ramp != RAMP_BENT &&
+           s->state.lamp.verdict == LAMP_KNOWN && believed(&s->state.lamp.belief) &&
            (believed(&s->state.tilt.belief) || !booth_accelerometer(&s->settings));
 }
 
@@ -275,6 +313,10 @@ json_t *status_json(const struct snapshot *s, const struct instruments_report *i
     json_object_set_new(out, "eye", eye_json(s));
     add_shown(out, s);
     json_object_set_new(out, "renderer", json_string(s->renderer));
+    json_object_set_new(
+        out, "output",
+        json_pack("{s:i, s:s}", "bits", s->output.bits, "ramp", ramp_name(s->output.ramp)));
+    json_object_set_new(out, "failure", text_or_null(s->failure.code ? s->failure.text : ""));
     json_object_set_new(out, "frames", json_integer((json_int_t)s->frames));
     json_object_set_new(out, "out_of_gamut", json_real(s->out_of_gamut));
     json_object_set_new(out, "display",

@@ -20,6 +20,9 @@ struct snapshot {
     enum show_kind show;
     char material[512], patch[64]; // "" = none
     struct counts counts;          // of a patch of counts
+    struct error failure;          // of what should be shown; code NONE while it is
+    bool matches;                  // what is shown is what is believed
+    struct renderer_output output;
     char renderer[128];
     double out_of_gamut; // share of the screen, 0..1
     uint64_t frames;

@@ -9,8 +9,9 @@
 // First member of each back end's own struct.
 struct context {
     int window_bits; // per channel of what is presented; 0 without a window
-    char note[160];  // what to say of the display besides the renderer's name, or ""
-    bool damaged;    // the window lost its picture since the last present
+    enum display_ramp ramp;
+    char note[160]; // what to say of the display besides the renderer's name, or ""
+    bool damaged;   // the window lost its picture since the last present
     // Makes the context current on this thread.
     bool (*use)(struct context *context, struct error *err);
     // Shows the back buffer and returns when the display has it.

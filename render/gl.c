@@ -25,6 +25,7 @@ struct renderer {
     char name[256];
     GLuint vertices, light_program, frame_program, light_target, frame_target;
     GLuint textures[TEXTURE_COUNT];
+    int bits_wanted;   // by the options
     int code_bits;     // of the counts texture
     struct scene last; // what is shown
     bool shown;        // last is valid
@@ -134,6 +135,7 @@ struct renderer *renderer_create(const struct renderer_options *options, struct 
     }
     r->width = options->width;
     r->height = options->height;
+    r->bits_wanted = options->bits;
     r->context = options->window ? window_open(options, err) : headless_open(err);
     if (!r->context || !set_up(r, err)) {
         renderer_destroy(r);
@@ -382,11 +384,15 @@ static void present(struct renderer *r)
     glFinish();
 }
 
-static int bits_of(const struct renderer *r, const struct scene *scene)
+static int bits_given(const struct renderer *r, int wanted)
 {
-    bool deep =
-        scene->bits == 10 && (r->context->window_bits == 0 || r->context->window_bits >= 10);
+    bool deep = wanted == 10 && (r->context->window_bits == 0 || r->context->window_bits >= 10);
     return deep ? 10 : 8;
+}
+
+struct renderer_output renderer_output(const struct renderer *r)
+{
+    return (struct renderer_output){bits_given(r, r->bits_wanted), r->context->ramp};
 }
 
 bool renderer_show(struct renderer *r, const struct scene *scene, bool force, bool *drawn,
@@ -398,7 +404,7 @@ bool renderer_show(struct renderer *r, const struct scene *scene, bool force, bo
     if (!again)
         return true;
     r->shown = false;
-    if (!r->context->use(r->context, err) || !size_counts(r, bits_of(r, scene), err))
+    if (!r->context->use(r->context, err) || !size_counts(r, bits_given(r, scene->bits), err))
         return false;
     switch (scene->kind) {
     case SCENE_DARK:

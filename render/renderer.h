@@ -21,6 +21,22 @@ struct renderer_options {
 struct renderer *renderer_create(const struct renderer_options *options, struct error *err);
 void renderer_destroy(struct renderer *renderer); // accepts NULL
 
+// What a monitor's gamma ramp makes of the counts.
+enum display_ramp {
+    RAMP_NONE,    // off screen: no monitor, no ramp
+    RAMP_UNKNOWN, // a plain window's, or the driver does not say
+    RAMP_NEUTRAL, // straight
+    RAMP_BENT,    // it could not be made straight: colours are wrong
+};
+
+// The way from counts to the panel.
+struct renderer_output {
+    int bits; // per channel, of what is shown: 8 or 10, at most what was asked for
+    enum display_ramp ramp;
+};
+
+struct renderer_output renderer_output(const struct renderer *renderer);
+
 // GL_RENDERER, and for a fullscreen monitor whether its gamma ramp could be
 // made neutral.
 const char *renderer_name(const struct renderer *renderer);

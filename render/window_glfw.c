@@ -123,12 +123,12 @@ static void keep_ramp(struct window *w, GLFWmonitor *monitor, const GLFWgammaram
 }
 
 // Sets a straight ramp and reads back what the driver made of it.
-static const char *straighten_ramp(struct window *w, GLFWmonitor *monitor)
+static enum display_ramp straighten_ramp(struct window *w, GLFWmonitor *monitor)
 {
     unsigned short straight[RAMP_MOST];
     const GLFWgammaramp *old = glfwGetGammaRamp(monitor);
     if (!old || old->size < 2 || old->size > RAMP_MOST)
-        return "gamma ramp unknown";
+        return RAMP_UNKNOWN;
     keep_ramp(w, monitor, old);
     GLFWgammaramp ramp = {straight, straight, straight, old->size};
     for (unsigned i = 0; i < ramp.size; i++)
@@ -136,7 +136,22 @@ static const char *straighten_ramp(struct window *w, GLFWmonitor *monitor)
     glfwSetGammaRamp(monitor, &ramp);
     const GLFWgammaramp *now = glfwGetGammaRamp(monitor);
     bool neutral = now && now->size == ramp.size && is_neutral(now);
-    return neutral ? "gamma ramp neutral" : "gamma ramp NOT neutral";
+    return neutral ? RAMP_NEUTRAL : RAMP_BENT;
+}
+
+static const char *ramp_note(enum display_ramp ramp)
+{
+    switch (ramp) {
+    case RAMP_NONE:
+        return "";
+    case RAMP_UNKNOWN:
+        return "gamma ramp unknown";
+    case RAMP_NEUTRAL:
+        return "gamma ramp neutral";
+    case RAMP_BENT:
+        return "gamma ramp NOT neutral";
+    }
+    return "";
 }
 
 static void hint(int bits)
@@ -180,8 +195,9 @@ static bool start(struct window *w, const struct renderer_options *options, stru
     glfwSetWindowUserPointer(w->window, w);
     glfwSetWindowRefreshCallback(w->window, on_damage);
     glfwSetInputMode(w->window, GLFW_CURSOR, GLFW_CURSOR_HIDDEN);
+    w->face.ramp = monitor ? straighten_ramp(w, monitor) : RAMP_UNKNOWN;
     if (monitor)
-        snprintf(w->face.note, sizeof w->face.note, "%s", straighten_ramp(w, monitor));
+        snprintf(w->face.note, sizeof w->face.note, "%s", ramp_note(w->face.ramp));
     else
         glfwSetWindowPos(w->window, 0, 0);
     glfwGetFramebufferSize(w->window, &width, &height);

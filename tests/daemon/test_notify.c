@@ -63,12 +63,33 @@ static void signs_of_life_come_twice_within_the_managers_patience(void **state)
     struct notifier n;
     notify_init(&n);
     for (int64_t now_ns = 0; now_ns < 40 * NS_PER_S; now_ns += 20 * NS_PER_MS) {
-        notify_alive(&n, now_ns);
+        notify_alive(&n, now_ns, true);
         manager_hears(&manager, "", 0); // its queue is short
     }
     notify_stopping();
     assert_true(manager_hears(&manager, "STOPPING=1", PATIENCE_MS));
     assert_int_equal(manager_count(&manager, "WATCHDOG=1"), 20);
+}
+
+static void no_sign_of_life_comes_once_nothing_could_be_drawn_for_a_while(void **state)
+{
+    (void)state;
+    struct notifier n;
+    int before;
+    notify_init(&n);
+    int64_t now_ns = NS_PER_S;
+    for (; now_ns < 11 * NS_PER_S; now_ns += 20 * NS_PER_MS)
+        notify_alive(&n, now_ns, now_ns % (3 * NS_PER_S) == 0); // fails, but not for long
+    manager_hears(&manager, "", 0);
+    before = manager_count(&manager, "WATCHDOG=1");
+    assert_true(before >= 5);
+    for (; now_ns < 60 * NS_PER_S; now_ns += 20 * NS_PER_MS)
+        notify_alive(&n, now_ns, false);
+    notify_stopping();
+    assert_true(manager_hears(&manager, "STOPPING=1", PATIENCE_MS));
+    assert_true(manager_count(&manager, "WATCHDOG=1") <= before + 2); // 5 s of patience
+    notify_alive(&n, now_ns, true);
+    assert_true(manager_hears(&manager, "WATCHDOG=1", PATIENCE_MS));
 }
 
 static void without_a_manager_nothing_happens(void **state)
@@ -81,7 +102,7 @@ static void without_a_manager_nothing_happens(void **state)
     assert_int_equal(n.every_ns, 0);
     notify_ready();
     notify_line(&n, "x");
-    notify_alive(&n, 0);
+    notify_alive(&n, 0, true);
     notify_stopping();
 }
 
@@ -103,6 +124,7 @@ int main(void)
         MANAGED(ready_and_stopping_are_told),
         MANAGED(a_status_line_is_told_when_it_changes),
         MANAGED(signs_of_life_come_twice_within_the_managers_patience),
+        MANAGED(no_sign_of_life_comes_once_nothing_could_be_drawn_for_a_while),
         MANAGED(without_a_manager_nothing_happens),
         MANAGED(another_process_watchdog_is_not_ours),
     };

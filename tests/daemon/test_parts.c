@@ -183,6 +183,27 @@ static void boothd_refuses_what_it_does_not_know(void **state)
     }
 }
 
+static void a_negative_number_is_a_number_and_no_option(void **state)
+{
+    (void)state;
+    struct ctl c;
+    struct error err = {0};
+    char *patch[] = {"boothctl", "patch", "--timeout", "3", "-0.1", "0", "0x1", NULL};
+    assert_false(ctl_parse(7, patch, &c, &err));
+    assert_holds(err.text, "R: \"-0.1\"");
+    assert_holds(err.text, "0..1");
+    patch[4] = "0.1";
+    assert_false(ctl_parse(7, patch, &c, &err));
+    assert_holds(err.text, "B: \"0x1\"");
+    patch[3] = "-3";
+    patch[6] = "1";
+    assert_false(ctl_parse(7, patch, &c, &err));
+    assert_holds(err.text, "--timeout: \"-3\"");
+    char *option[] = {"boothctl", "status", "-x", NULL};
+    assert_false(ctl_parse(3, option, &c, &err));
+    assert_holds(err.text, "option");
+}
+
 static void boothctl_makes_whole_paths_before_it_asks(void **state)
 {
     (void)state;
@@ -210,6 +231,7 @@ int main(void)
         cmocka_unit_test(the_average_of_readings_is_their_mean_and_rms_spread),
         cmocka_unit_test(boothd_finds_its_settings_and_takes_its_options),
         cmocka_unit_test(boothd_refuses_what_it_does_not_know),
+        cmocka_unit_test(a_negative_number_is_a_number_and_no_option),
         cmocka_unit_test(boothctl_makes_whole_paths_before_it_asks),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

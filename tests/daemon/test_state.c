@@ -333,6 +333,39 @@ static void the_eye_is_placed_in_the_booth_and_held_while_lost(void **state)
     assert_int_equal(s.eye.belief.standing, STANDING_FRESH);
 }
 
+static void a_resting_eye_is_steadier_than_its_samples(void **state)
+{
+    struct world *w = *state;
+    const double noise = 0.007; // m in depth, as the camera's pixels make it
+    double squares = 0, farthest = 0;
+    for (int i = 0; i < 2000; i++) {
+        struct vec3 seen = {0.1, 0.5, 0.6 + noise * gauss(w)};
+        double off = read_head(w, seen, TRACKER_SEEN).eye.at.z - 0.6;
+        squares += i < 200 ? 0 : off * off;
+        farthest = fmax(farthest, i < 200 ? 0 : fabs(off));
+    }
+    assert_true(sqrt(squares / 1800) < noise / 2.5);
+    assert_true(farthest < 2 * noise);
+}
+
+static void a_moving_eye_is_followed_within_a_few_centimetres_and_then_reached(void **state)
+{
+    struct world *w = *state;
+    static const double LAG_M = 0.055; // what the header promises, and a sample's way
+    double farthest = 0;
+    for (double speed = 0.1; speed < 2; speed *= 2) {
+        struct vec3 at = {-0.4, 0.5, 0.6};
+        pass(w, NS_PER_S); // forgotten meanwhile: the next place counts at once
+        assert_near(read_head(w, at, TRACKER_SEEN).eye.at.x, -0.4, EXACT);
+        for (; at.x < 0.4; at.x += speed * 0.01)
+            farthest = fmax(farthest, at.x - read_head(w, at, TRACKER_SEEN).eye.at.x);
+        for (int i = 0; i < 60; i++)
+            read_head(w, at, TRACKER_SEEN);
+        assert_near(w->state.eye.at.x, at.x, 0.001);
+    }
+    assert_true(farthest > 0.005 && farthest < LAG_M);
+}
+
 static void a_clock_that_goes_back_starts_ages_at_zero_and_blocks_nothing(void **state)
 {
     struct world *w = *state;
@@ -453,6 +486,8 @@ int main(void)
         IN_A_WORLD(an_implausible_tilt_is_passed_over),
         IN_A_WORLD(tilts_on_both_sides_of_the_half_turn_are_neighbours),
         IN_A_WORLD(the_eye_is_placed_in_the_booth_and_held_while_lost),
+        IN_A_WORLD(a_resting_eye_is_steadier_than_its_samples),
+        IN_A_WORLD(a_moving_eye_is_followed_within_a_few_centimetres_and_then_reached),
         IN_A_WORLD(a_clock_that_goes_back_starts_ages_at_zero_and_blocks_nothing),
         IN_A_WORLD(a_sample_older_than_the_last_one_is_passed_over),
         IN_A_WORLD(equal_times_divide_by_nothing),

@@ -165,13 +165,17 @@ static void ten_bits_on_an_eight_bit_window_become_eight(void **state)
     (void)state;
     struct surface s;
     struct error err = {0};
-    struct renderer *renderer = open_window(&err);
+    struct renderer_options options = {
+        .window = true, .width = SCREEN_WIDTH, .height = SCREEN_HEIGHT, .bits = 10};
+    struct renderer *renderer = renderer_create(&options, &err);
     assert_good(renderer, err);
     surface_init(&s);
     s.scene.screen.width_px = SCREEN_WIDTH;
     s.scene.screen.height_px = SCREEN_HEIGHT;
     s.scene.bits = 10;
     s.scene.dither = true;
+    assert_int_equal(renderer_output(renderer).bits, 8);
+    assert_int_equal(renderer_output(renderer).ramp, RAMP_UNKNOWN); // nobody asked for it
     assert_good(renderer_show(renderer, &s.scene, false, NULL, &err), err);
     assert_screen_is(renderer);
     renderer_destroy(renderer);
@@ -202,6 +206,9 @@ static void full_screen_on_the_first_monitor_shows_the_same(void **state)
     assert_good(renderer, err);
     print_message("%s\n", renderer_name(renderer));
     assert_non_null(strstr(renderer_name(renderer), "gamma ramp"));
+    bool neutral = strstr(renderer_name(renderer), "ramp neutral");
+    assert_int_equal(renderer_output(renderer).ramp == RAMP_NEUTRAL, neutral);
+    assert_int_not_equal(renderer_output(renderer).ramp, RAMP_NONE);
     struct scene patch = {.kind = SCENE_PATCH, .patch = {0.25, 0.5, 0.75}, .bits = 8};
     assert_good(renderer_show(renderer, &patch, false, NULL, &err), err);
     assert_screen_is(renderer);

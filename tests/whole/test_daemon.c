@@ -240,11 +240,12 @@ static void every_bad_request_is_refused_by_name_and_hurts_nobody(void **state)
             "colorchecker24");
     refused(json_pack("{ss,ss,ss}", "do", "show", "material", "white", "patch", "x"), ERROR_RANGE,
             "\"x\"");
-    refused(json_pack("{ss,ss}", "do", "show", "material", "/nowhere/m.ini"), ERROR_SYSTEM,
+    refused(json_pack("{ss,ss}", "do", "show", "material", "/nowhere/m.ini"), ERROR_CONFIG,
             "/nowhere/m.ini");
     refused(json_pack("{ss,s[ff]}", "do", "patch", "rgb", 0.5, 0.5), ERROR_RANGE, "rgb");
     refused(json_pack("{ss,s[fff]}", "do", "patch", "rgb", 0.5, 1.5, 0.5), ERROR_RANGE, "1.5");
-    refused(json_pack("{ss,s[ffs]}", "do", "patch", "rgb", 0.5, 0.5, "x"), ERROR_RANGE, "rgb");
+    refused(json_pack("{ss,s[ffs]}", "do", "patch", "rgb", 0.5, 0.5, "x"), ERROR_RANGE,
+            "number 3 must be");
     refused(json_pack("{ss,s[fff],si}", "do", "patch", "rgb", 0.5, 0.5, 0.5, "gamma", 2),
             ERROR_RANGE, "gamma");
     refused(json_pack("{ss,ss}", "do", "capture", "file", "shot.png"), ERROR_RANGE, "whole path");
