@@ -10,6 +10,8 @@
 
 static const double FULL = 255;
 
+enum { GREYS = 2 }; // greys a step of the ramps: errors of a neutral are seen first
+
 // SplitMix64 (Steele, Lea, Flood 2014).
 static uint64_t next_random(uint64_t *state)
 {
@@ -57,8 +59,10 @@ static void add_ramps(struct patch_set *set, int steps)
         add(set, v, 0, 0);
         add(set, 0, v, 0);
         add(set, 0, 0, v);
-        if (i < steps)
-            add(set, v, v, v);
+    }
+    for (int i = 1; i < GREYS * steps; i++) {
+        double v = pow((double)i / (GREYS * steps), 1.4);
+        add(set, v, v, v);
     }
     add(set, 0, 0, 0);
     add(set, 0, 0, 0);
@@ -67,7 +71,7 @@ static void add_ramps(struct patch_set *set, int steps)
 bool patch_set_characterise(int ramp_steps, int random, int white_every, uint64_t seed,
                             struct patch_set *out, struct error *err)
 {
-    int body = 4 * ramp_steps + 1 + random;
+    int body = (3 + GREYS) * ramp_steps + 1 + random;
     struct patch_set plain = {.patches = calloc((size_t)body, sizeof *plain.patches)};
     struct patch_set set = {.patches = calloc((size_t)(2 * body + 2), sizeof *set.patches)};
     if (!plain.patches || !set.patches || white_every < 1) {
@@ -79,7 +83,8 @@ bool patch_set_characterise(int ramp_steps, int random, int white_every, uint64_
     add_ramps(&plain, ramp_steps);
     for (int i = 0; i < random; i++) {
         double r = uniform(&state), g = uniform(&state), b = uniform(&state);
-        add(&plain, r, g, b);
+        double grey = (r + g + b) / 3, pull = i % 3 ? 0.6 : 0; // surfaces are seldom saturated
+        add(&plain, r + pull * (grey - r), g + pull * (grey - g), b + pull * (grey - b));
     }
     shuffle(plain.patches, plain.count, &state);
     for (int i = 0; i < plain.count; i++) {

@@ -22,9 +22,10 @@ struct patch_set {
 
 void patch_set_fini(struct patch_set *set);
 
-// Ramps of red, green, blue and grey (ramp_steps levels each, denser near
-// black), `random` colours in between, in random order, white first, last and
-// every `white_every` patches; black twice. Deterministic by seed. 8-bit codes.
+// Ramps of red, green and blue (ramp_steps levels each, denser near black), of
+// grey (twice as many) and `random` colours in between, most of them muted, in
+// random order; white first, last and every `white_every` patches; black
+// twice. Deterministic by seed. 8-bit codes.
 bool patch_set_characterise(int ramp_steps, int random, int white_every, uint64_t seed,
                             struct patch_set *out, struct error *err);
 
