@@ -226,8 +226,9 @@ void world_state_at(struct world *world, int64_t at_ns, struct world_state *out)
 
 static double output_of(const struct world *w, const struct world_state *s, int lamp)
 {
-    double warmth = w->scenario.world.cold ? lamp_warmth(&w->lamps[lamp], s->on_s[lamp]) : 1;
-    return s->level[lamp] * warmth;
+    if (!w->scenario.world.cold || s->level[lamp] <= 0) // there need be no such lamp
+        return s->level[lamp];
+    return s->level[lamp] * lamp_warmth(&w->lamps[lamp], s->on_s[lamp]);
 }
 
 static void add_light(const struct world *w, int lamp, double k, struct spectrum *out)

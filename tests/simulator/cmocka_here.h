@@ -20,12 +20,14 @@
 
 #define SHIPPED "simulator/scenarios/booth.ini"
 
-// The shipped booth with ceilings coarse enough for a test to be quick.
+// The shipped booth with ceilings coarse enough for a test to be quick, and
+// lamps that are warm at once.
 static inline void small_booth(struct scenario *scenario)
 {
     struct error err = {0};
     if (!scenario_load(SHIPPED, scenario, &err))
         fail_msg("%s", err.text);
+    scenario->world.cold = false;
     scenario->ceiling.true_px[0] = 128;
     scenario->ceiling.true_px[1] = 85;
     scenario->ceiling.map_px[0] = 64;

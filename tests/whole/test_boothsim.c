@@ -20,6 +20,7 @@
 #include "tests/fakes/near.h"
 
 #define NEAR_LUX 15.0 // the lamp is set for the centre point; the spot's mean is within 1 %
+#define COLD_LUX 30.0 // less, just after it was switched on
 
 enum { PATIENCE_MS = 20000 }; // bounds a hang, measures nothing
 
@@ -183,7 +184,8 @@ static void a_booth_without_a_command_answers_until_it_is_told_to_stop(void **st
         ask(client, "{\"do\": \"fault\", \"instrument\": \"camera\", \"kind\": \"silent\"}"));
     json_t *answer = ask(client, "{\"do\": \"truth\", \"reflectance\": 0.5}");
     assert_string_equal(json_string_value(json_object_get(answer, "lamp")), "A");
-    assert_near(json_number_value(json_object_get(answer, "lux")), 1500, NEAR_LUX);
+    double lux = json_number_value(json_object_get(answer, "lux"));
+    assert_true(lux > 1500 - NEAR_LUX - COLD_LUX && lux < 1500 + NEAR_LUX);
     json_decref(answer);
     assert_null(control_call(client, json_pack("{s:s}", "do", "dance"), PATIENCE_MS, &err));
     assert_int_equal(err.code, ERROR_CONFIG);
