@@ -11,6 +11,7 @@
 #include "colorimetry/illuminant.h"
 #include "config/bands_file.h"
 #include "config/spectra.h"
+#include "files/text.h"
 #include "files/write.h"
 
 static const char DATA_FOLDER[] =
@@ -34,12 +35,6 @@ struct derived {
     struct band_set sets[BANDS_MOST + 1]; // by count
     double rms[BANDS_MOST + 1];
 };
-
-static bool ends_with(const char *text, const char *end)
-{
-    size_t size = strlen(text);
-    return size > strlen(end) && !strcmp(text + size - strlen(end), end);
-}
 
 static void put_numbers(FILE *out, const char *format, const double *v, int count)
 {
@@ -160,7 +155,7 @@ static bool parse_optimise(int argc, char **argv, struct task *task)
     }
     if (!task->out)
         return false;
-    if (!task->count && !ends_with(task->out, ".c"))
+    if (!task->count && !text_ends_with(task->out, ".c"))
         task->count = BANDS_SHIPPED;
     return true;
 }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "config/lamps.h"
 
-#include <dirent.h>
 #include <errno.h>
 #include <limits.h>
 #include <math.h>
@@ -105,12 +104,6 @@ bool lamp_load(const char *path, struct lamp *lamp, struct error *err)
     return true;
 }
 
-static int is_ini(const struct dirent *entry)
-{
-    size_t length = strlen(entry->d_name);
-    return length > 4 && *entry->d_name != '.' && !strcmp(entry->d_name + length - 4, ".ini");
-}
-
 static bool add(const char *folder, const char *file, struct lamps *lamps, struct error *err)
 {
     char path[PATH_MAX];
@@ -131,7 +124,7 @@ bool lamps_load(const char *folder, struct lamps *lamps, struct error *err)
 {
     struct dirent **entries = NULL;
     struct lamps loaded = {0};
-    int count = scandir(folder, &entries, is_ini, alphasort);
+    int count = scandir(folder, &entries, path_is_ini, alphasort);
     if (count < 0)
         return fail(err, ERROR_CONFIG, "the lamp folder %s: %s", folder, strerror(errno));
     bool fine = true;

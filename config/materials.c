@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "config/materials.h"
 
-#include <dirent.h>
 #include <limits.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -130,17 +129,11 @@ static bool make(const struct material_file *f, struct material *out, struct err
     return fail(err, ERROR_CONFIG, "kind: unknown");
 }
 
-static int is_ini(const struct dirent *entry)
-{
-    size_t length = strlen(entry->d_name);
-    return length > 4 && *entry->d_name != '.' && !strcmp(entry->d_name + length - 4, ".ini");
-}
-
 static bool unknown(const char *folder, const char *name, struct error *err)
 {
     struct dirent **entries = NULL;
     char list[300] = "none";
-    int count = scandir(folder, &entries, is_ini, alphasort);
+    int count = scandir(folder, &entries, path_is_ini, alphasort);
     for (int i = 0, used = 0; i < count; i++) {
         if (used < (int)sizeof list)
             used += snprintf(list + used, sizeof list - used, "%s%.*s", i ? ", " : "",

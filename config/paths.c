@@ -36,6 +36,12 @@ bool path_absolute(const char *path, char *out, size_t size, struct error *err)
     return path_beside(here, path, out, size, err);
 }
 
+int path_is_ini(const struct dirent *entry)
+{
+    size_t size = strlen(entry->d_name);
+    return size > 4 && *entry->d_name != '.' && !strcmp(entry->d_name + size - 4, ".ini");
+}
+
 bool path_exists(const char *path)
 {
     return *path && access(path, F_OK) == 0;

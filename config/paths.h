@@ -3,6 +3,7 @@
 #ifndef CONFIG_PATHS_H
 #define CONFIG_PATHS_H
 
+#include <dirent.h>
 #include <stdbool.h>
 #include <stddef.h>
 
@@ -18,6 +19,9 @@ bool path_beside(const char *file, const char *name, char *out, size_t size, str
 // path made absolute from the working folder. Error CONFIG when it does not
 // fit, SYSTEM when there is no working folder.
 bool path_absolute(const char *path, char *out, size_t size, struct error *err);
+
+// For scandir: a name such as "D50.ini" that is not hidden.
+int path_is_ini(const struct dirent *entry);
 
 // True when a file or folder of that name exists.
 bool path_exists(const char *path);

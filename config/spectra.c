@@ -5,12 +5,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 #include <unistd.h>
 
 #include "colorimetry/illuminant.h"
 #include "files/cgats.h"
 #include "files/table.h"
+#include "files/text.h"
 
 #define FIELD_SLACK_NM 0.51 // field names carry whole nanometres
 #define LAMP_NOISE 0.05     // of its peak: an instrument's noise where it sees badly
@@ -212,19 +212,11 @@ static bool find_fields(const struct table *t, struct fields *f, struct error *e
     return true;
 }
 
-static int line_of(const struct cgats *file, const char *key)
-{
-    for (size_t i = 0; i < file->keyword_count; i++)
-        if (strcmp(file->keywords[i].name, key) == 0)
-            return file->keywords[i].line;
-    return 0;
-}
-
 static bool contradicts(const struct cgats *file, const char *key, double value,
                         const char *fields_say, double is, struct error *err)
 {
     return fail(err, ERROR_DATA, "%s:%d: %s is %g but %s%g", file->table.path,
-                line_of(file, key), key, value, fields_say, is);
+                cgats_line(file, key), key, value, fields_say, is);
 }
 
 // The header against the fields; wavelengths of full precision from the header.
@@ -247,7 +239,7 @@ static bool check_header(const struct cgats *file, struct fields *f, struct erro
         return contradicts(file, "SPECTRAL_END_NM", end, last_is, last, err);
     if (!(norm > 0))
         return fail(err, ERROR_DATA, "%s:%d: SPECTRAL_NORM is %g; it must be above 0",
-                    file->table.path, line_of(file, "SPECTRAL_NORM"), norm);
+                    file->table.path, cgats_line(file, "SPECTRAL_NORM"), norm);
     f->norm = norm;
     for (size_t i = 0; i < f->count; i++) {
         double nm = start + (end - start) * (double)i / (double)(f->count - 1);
@@ -289,12 +281,6 @@ static bool from_cgats(const struct cgats *file, bool held, struct spectra *out,
 
 // ---- either ------------------------------------------------------------------
 
-static bool ends_with(const char *text, const char *end)
-{
-    size_t n = strlen(text), m = strlen(end);
-    return n >= m && strcasecmp(text + n - m, end) == 0;
-}
-
 static bool load_cgats(const char *path, bool held, struct spectra *out, struct error *err)
 {
     struct cgats file = {0};
@@ -314,7 +300,7 @@ static bool load_csv(const char *path, bool held, struct spectra *out, struct er
 bool spectra_load(const char *path, bool held, struct spectra *out, struct error *err)
 {
     struct spectra loaded = {0};
-    bool cgats = ends_with(path, ".sp") || ends_with(path, ".ti3");
+    bool cgats = text_ends_with(path, ".sp") || text_ends_with(path, ".ti3");
     bool ok = cgats ? load_cgats(path, held, &loaded, err) : load_csv(path, held, &loaded, err);
     if (!ok) {
         spectra_fini(&loaded);
@@ -327,7 +313,7 @@ bool spectra_load(const char *path, bool held, struct spectra *out, struct error
 bool spectra_is_path(const char *text)
 {
     struct spectrum cie;
-    if (strchr(text, '/') || ends_with(text, ".csv") || ends_with(text, ".sp"))
+    if (strchr(text, '/') || text_ends_with(text, ".csv") || text_ends_with(text, ".sp"))
         return true;
     return !illuminant(text, &cie, NULL) && access(text, F_OK) == 0;
 }

@@ -531,6 +531,12 @@ const char *cgats_keyword(const struct cgats *file, const char *name)
     return keyword ? keyword->value : NULL;
 }
 
+int cgats_line(const struct cgats *file, const char *name)
+{
+    const struct cgats_keyword *keyword = find_keyword(file, name);
+    return keyword ? keyword->line : 0;
+}
+
 bool cgats_numbers(const struct cgats *file, const char *name, double *values, size_t count,
                    struct error *err)
 {

@@ -40,6 +40,9 @@ bool cgats_load_as(const char *path, const char *identifier, struct cgats *file,
 // Value of a keyword or NULL.
 const char *cgats_keyword(const struct cgats *file, const char *name);
 
+// The line that a keyword stands on, 0 when it is missing.
+int cgats_line(const struct cgats *file, const char *name);
+
 // A keyword as count finite numbers; error names file, line and key.
 bool cgats_numbers(const struct cgats *file, const char *name, double *values, size_t count,
                    struct error *err);

@@ -71,6 +71,12 @@ const char *text_shown(char shown[TEXT_SHOWN], const char *text, size_t size)
     return shown;
 }
 
+bool text_ends_with(const char *text, const char *end)
+{
+    size_t size = strlen(text), tail = strlen(end);
+    return size > tail && !strcasecmp(text + size - tail, end);
+}
+
 // Bytes of the UTF-8 character at s, 0 when it is none (RFC 3629).
 static size_t character(const uint8_t *s, size_t size)
 {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the text readers of this folder share: is a piece of text a number, is
-// it text at all, and how it is shown in an error.
+// What readers of texts share: is a piece of text a number, is it text at all,
+// how does it end, and how is it shown in an error.
 #ifndef FILES_TEXT_H
 #define FILES_TEXT_H
 
@@ -25,6 +25,9 @@ enum { TEXT_SHOWN = 64 };
 
 // text for an error: one line, at most 40 bytes, anything unprintable as '?'.
 const char *text_shown(char shown[TEXT_SHOWN], const char *text, size_t size);
+
+// Whether text ends so and holds more than that; letter case does not count.
+bool text_ends_with(const char *text, const char *end);
 
 // Index of the first byte that is no UTF-8 text (NUL and control characters
 // other than tab, line feed and carriage return included), or size.

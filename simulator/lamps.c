@@ -7,6 +7,7 @@
 #include "colorimetry/colour.h"
 #include "colorimetry/illuminant.h"
 #include "files/cgats.h"
+#include "files/text.h"
 
 static bool powers_to_spectrum(const char *path, const double *nm, const double *power,
                                size_t count, struct spectrum *out, struct error *err)
@@ -96,17 +97,11 @@ static bool from_sp(const char *path, struct spectrum *out, struct error *err)
     return good;
 }
 
-static bool ends_with(const char *text, const char *end)
-{
-    size_t length = strlen(text), tail = strlen(end);
-    return length > tail && !strcmp(text + length - tail, end);
-}
-
 bool lamp_spectrum_load(const char *name_or_path, struct spectrum *out, struct error *err)
 {
-    if (ends_with(name_or_path, ".sp"))
+    if (text_ends_with(name_or_path, ".sp"))
         return from_sp(name_or_path, out, err);
-    if (strchr(name_or_path, '/') || ends_with(name_or_path, ".csv"))
+    if (strchr(name_or_path, '/') || text_ends_with(name_or_path, ".csv"))
         return from_csv(name_or_path, out, err);
     return illuminant(name_or_path, out, err);
 }

@@ -80,6 +80,8 @@ static void an_example_is_read_as_it_stands(void **state)
     assert_string_equal(cgats_keyword(&file, "NORMALIZED_TO_Y_100"), "NO");
     assert_null(cgats_keyword(&file, "NUMBER_OF_SETS"));
     assert_null(cgats_keyword(&file, "KEYWORD"));
+    assert_int_equal(cgats_line(&file, "DESCRIPTOR"), file.keywords[0].line);
+    assert_int_equal(cgats_line(&file, "NUMBER_OF_SETS"), 0);
     assert_int_equal(file.keyword_count, 3);
     assert_int_equal(file.keywords[1].line, 5);
     assert_int_equal(t->columns, 5);

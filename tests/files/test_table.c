@@ -10,6 +10,7 @@
 #include <math.h>
 
 #include "files/table.h"
+#include "files/text.h"
 #include "tests/files/place.h"
 
 static struct table good(const char *text, size_t columns, size_t rows)
@@ -272,6 +273,14 @@ static void an_error_in_a_file_names_the_file(void **state)
     table_fini(&t);
 }
 
+static void a_text_ends_with_what_it_is_longer_than(void **state)
+{
+    (void)state;
+    assert_true(text_ends_with("lamp.csv", ".csv") && text_ends_with("LAMP.CSV", ".csv"));
+    assert_false(text_ends_with(".csv", ".csv") || text_ends_with("lamp.csv ", ".csv"));
+    assert_false(text_ends_with("", ".csv") || text_ends_with("sv", ".csv"));
+}
+
 static void real_lamps_and_reflectances_load(void **state)
 {
     (void)state;
@@ -317,6 +326,7 @@ int main(void)
         cmocka_unit_test(too_many_columns_are_refused),
         cmocka_unit_test(a_missing_file_and_a_folder_are_named),
         cmocka_unit_test(an_error_in_a_file_names_the_file),
+        cmocka_unit_test(a_text_ends_with_what_it_is_longer_than),
         cmocka_unit_test(real_lamps_and_reflectances_load),
     };
     return cmocka_run_group_tests_name("table", tests, open_place, close_place);
