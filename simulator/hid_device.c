@@ -2,7 +2,6 @@
 #include "simulator/hid_device.h"
 
 #include <linux/hidraw.h>
-#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,9 +9,8 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "simulator/wire_device.h"
 #include "simulator/wire_fault.h"
-#include "simulator/wire_node.h"
-#include "simulator/wire_wait.h"
 
 enum { REPORTS = 64 }; // as the kernel's hidraw keeps for a reader
 
@@ -22,22 +20,14 @@ struct report {
 };
 
 struct hid_device_emulated {
-    UMockdevTestbed *testbed;
-    UMockdevIoctlBase *handler;
+    struct wire_device wire; // its lock guards what follows the paths
+    int number;              // of the HID device, 1 at the first plug
+    char hid_path[128], hidraw_path[192];
     struct hid_model model;
-    struct node node;
-    int number; // of the HID device, 1 at the first plug
-    char devnode[32], hid_path[128], hidraw_path[192];
-
-    struct waiter waiter; // its lock guards everything below and the model
-    pthread_t thread;
-    bool running, stopping, plugged;
     int clients;
     struct report queue[REPORTS];
     int queued;
     UMockdevIoctlClient *reader; // waits in a blocking read
-    enum wire_fault fault;
-    struct noise noise;
 };
 
 // ---- reports -----------------------------------------------------------------------
@@ -48,7 +38,7 @@ static struct report take(struct hid_device_emulated *d)
     d->queued--;
     memmove(d->queue, d->queue + 1, (size_t)d->queued * sizeof(d->queue[0]));
     if (d->queued == 0)
-        node_set_readable(&d->node, false);
+        node_set_readable(&d->wire.node, false);
     return first;
 }
 
@@ -63,7 +53,7 @@ static void give(UMockdevIoctlClient *client, const struct report *report)
 
 static void queue(struct hid_device_emulated *d, struct report report)
 {
-    report.size = fault_on(d->fault, &d->noise, report.bytes, report.size);
+    report.size = fault_on(d->wire.fault, &d->wire.noise, report.bytes, report.size);
     if (report.size == 0 || d->clients == 0)
         return;
     if (d->reader) {
@@ -75,11 +65,12 @@ static void queue(struct hid_device_emulated *d, struct report report)
         return;
     d->queue[d->queued++] = report;
     if (d->queued == 1)
-        node_set_readable(&d->node, true);
+        node_set_readable(&d->wire.node, true);
 }
 
-static int64_t pump(struct hid_device_emulated *d)
+static int64_t pump(void *owner)
 {
+    struct hid_device_emulated *d = owner;
     for (;;) {
         struct report report;
         int64_t again_ns;
@@ -91,26 +82,14 @@ static int64_t pump(struct hid_device_emulated *d)
     }
 }
 
-static void *run(void *argument)
-{
-    struct hid_device_emulated *d = argument;
-    waiter_lock(&d->waiter);
-    while (!d->stopping) {
-        int64_t again_ns = d->plugged ? pump(d) : INT64_MAX;
-        waiter_wait(&d->waiter, again_ns);
-    }
-    waiter_unlock(&d->waiter);
-    return NULL;
-}
-
 // ---- hidraw --------------------------------------------------------------------------
 
 static gboolean on_read(UMockdevIoctlBase *handler, UMockdevIoctlClient *client, gpointer data)
 {
     (void)handler;
     struct hid_device_emulated *d = data;
-    waiter_lock(&d->waiter);
-    if (!d->plugged) {
+    waiter_lock(&d->wire.waiter);
+    if (!d->wire.plugged) {
         umockdev_ioctl_client_complete(client, -1, EIO);
     } else if (d->queued > 0) {
         struct report report = take(d);
@@ -118,7 +97,7 @@ static gboolean on_read(UMockdevIoctlBase *handler, UMockdevIoctlClient *client,
     } else {
         d->reader = client;
     }
-    waiter_unlock(&d->waiter);
+    waiter_unlock(&d->wire.waiter);
     return TRUE;
 }
 
@@ -128,14 +107,13 @@ static gboolean on_write(UMockdevIoctlBase *handler, UMockdevIoctlClient *client
     struct hid_device_emulated *d = data;
     UMockdevIoctlData *arg = umockdev_ioctl_client_get_arg(client);
     size_t size = (size_t)arg->data_len;
-    waiter_lock(&d->waiter);
+    waiter_lock(&d->wire.waiter);
     int status = -ENODEV;
-    if (d->plugged)
+    if (d->wire.plugged)
         status = d->model.out(d->model.context, clock_now_ns(), arg->data, size);
-    waiter_wake(&d->waiter);
-    waiter_unlock(&d->waiter);
-    umockdev_ioctl_client_complete(client, status < 0 ? -1 : (glong)size,
-                                   status < 0 ? -status : 0);
+    waiter_wake(&d->wire.waiter);
+    waiter_unlock(&d->wire.waiter);
+    umockdev_ioctl_client_complete(client, status < 0 ? -1 : (glong)size, status < 0 ? -status : 0);
     return TRUE;
 }
 
@@ -160,7 +138,7 @@ static int put_descriptor(const struct hid_model *m, UMockdevIoctlData *arg)
 static int answer(struct hid_device_emulated *d, gulong request, UMockdevIoctlData *arg)
 {
     const struct hid_model *m = &d->model;
-    if (!d->plugged)
+    if (!d->wire.plugged)
         return -ENODEV;
     if (request == HIDIOCGRDESCSIZE) {
         int size = (int)m->descriptor_size;
@@ -186,10 +164,10 @@ static gboolean on_ioctl(UMockdevIoctlBase *handler, UMockdevIoctlClient *client
 {
     (void)handler;
     struct hid_device_emulated *d = data;
-    waiter_lock(&d->waiter);
-    int result = answer(d, umockdev_ioctl_client_get_request(client),
-                        umockdev_ioctl_client_get_arg(client));
-    waiter_unlock(&d->waiter);
+    waiter_lock(&d->wire.waiter);
+    int result =
+        answer(d, umockdev_ioctl_client_get_request(client), umockdev_ioctl_client_get_arg(client));
+    waiter_unlock(&d->wire.waiter);
     umockdev_ioctl_client_complete(client, result < 0 ? -1 : result, result < 0 ? -result : 0);
     return TRUE;
 }
@@ -198,22 +176,22 @@ static void on_connected(UMockdevIoctlBase *handler, UMockdevIoctlClient *client
 {
     (void)handler, (void)client;
     struct hid_device_emulated *d = data;
-    waiter_lock(&d->waiter);
+    waiter_lock(&d->wire.waiter);
     d->clients++;
-    waiter_unlock(&d->waiter);
+    waiter_unlock(&d->wire.waiter);
 }
 
 static void on_vanished(UMockdevIoctlBase *handler, UMockdevIoctlClient *client, gpointer data)
 {
     (void)handler;
     struct hid_device_emulated *d = data;
-    waiter_lock(&d->waiter);
+    waiter_lock(&d->wire.waiter);
     if (d->reader == client)
         d->reader = NULL;
     d->clients--;
     while (d->clients == 0 && d->queued > 0)
         take(d);
-    waiter_unlock(&d->waiter);
+    waiter_unlock(&d->wire.waiter);
 }
 
 // ---- the radio link ------------------------------------------------------------------
@@ -238,25 +216,18 @@ static void describe_hidraw(const struct hid_device_emulated *d, GString *text)
     g_string_append_printf(text,
                            "P: %s\nN: %s=00\nE: SUBSYSTEM=hidraw\nE: DEVNAME=%s\nE: MAJOR=%d\n"
                            "E: MINOR=%d\nA: dev=%d:%d\\n\nL: device=../../../%s\n",
-                           d->hidraw_path, d->devnode + strlen("/dev/"), d->devnode,
-                           d->node.major_number, d->node.minor_number, d->node.major_number,
-                           d->node.minor_number, strrchr(d->hid_path, '/') + 1);
+                           d->hidraw_path, d->wire.devnode + strlen("/dev/"), d->wire.devnode,
+                           d->wire.node.major_number, d->wire.node.minor_number,
+                           d->wire.node.major_number, d->wire.node.minor_number,
+                           strrchr(d->hid_path, '/') + 1);
 }
 
 static bool add(struct hid_device_emulated *d,
-                void (*describe)(const struct hid_device_emulated *, GString *),
-                struct error *err)
+                void (*describe)(const struct hid_device_emulated *, GString *), struct error *err)
 {
-    GError *problem = NULL;
     GString *text = g_string_new(NULL);
     describe(d, text);
-    bool added = umockdev_testbed_add_from_string(d->testbed, text->str, &problem);
-    g_string_free(text, TRUE);
-    if (!added) {
-        fail(err, ERROR_SYSTEM, "emulating %s: %s", d->devnode, problem->message);
-        g_error_free(problem);
-    }
-    return added;
+    return wire_device_add(&d->wire, text, err);
 }
 
 static void syspath(char sys[256], const char *path)
@@ -268,15 +239,15 @@ static void uevent(struct hid_device_emulated *d, const char *path, const char *
 {
     char sys[256];
     syspath(sys, path);
-    umockdev_testbed_uevent(d->testbed, sys, action);
+    umockdev_testbed_uevent(d->wire.testbed, sys, action);
 }
 
 static void remove_from_sysfs(struct hid_device_emulated *d, const char *path)
 {
     char sys[256];
     syspath(sys, path);
-    umockdev_testbed_uevent(d->testbed, sys, "remove");
-    umockdev_testbed_remove_device(d->testbed, sys);
+    umockdev_testbed_uevent(d->wire.testbed, sys, "remove");
+    umockdev_testbed_remove_device(d->wire.testbed, sys);
 }
 
 // umockdev 0.17 leaves this link behind, and the next terminal may get the
@@ -284,75 +255,64 @@ static void remove_from_sysfs(struct hid_device_emulated *d, const char *path)
 static void remove_number_link(struct hid_device_emulated *d)
 {
     char link[256];
-    char *root = umockdev_testbed_get_root_dir(d->testbed);
-    snprintf(link, sizeof(link), "%s/sys/dev/char/%d:%d", root, d->node.major_number,
-             d->node.minor_number);
+    char *root = umockdev_testbed_get_root_dir(d->wire.testbed);
+    snprintf(link, sizeof(link), "%s/sys/dev/char/%d:%d", root, d->wire.node.major_number,
+             d->wire.node.minor_number);
     g_free(root);
     unlink(link);
 }
 
 static bool show(struct hid_device_emulated *d, struct error *err)
 {
-    GError *problem = NULL;
-    if (!umockdev_testbed_attach_ioctl(d->testbed, d->devnode, d->handler, &problem)) {
-        fail(err, ERROR_SYSTEM, "emulating %s: %s", d->devnode, problem->message);
-        g_error_free(problem);
+    if (!add(d, describe_hid, err) || !add(d, describe_hidraw, err) ||
+        !node_link(&d->wire.node, d->wire.testbed, d->wire.devnode, err))
         return false;
-    }
-    if (add(d, describe_hid, err) && add(d, describe_hidraw, err) &&
-        node_link(&d->node, d->testbed, d->devnode, err)) {
-        uevent(d, d->hid_path, "add");
-        uevent(d, d->hidraw_path, "add");
-        return true;
-    }
-    umockdev_testbed_detach_ioctl(d->testbed, d->devnode, NULL);
-    return false;
+    uevent(d, d->hid_path, "add");
+    uevent(d, d->hidraw_path, "add");
+    return true;
 }
 
 bool hid_plug(struct hid_device_emulated *device, struct error *err)
 {
     struct hid_device_emulated *d = device;
-    if (d->plugged)
+    if (d->wire.plugged)
         return true;
-    if (!node_open(&d->node, err))
-        return false;
     const struct hid_model *m = &d->model;
     d->number++;
-    snprintf(d->devnode, sizeof(d->devnode), "/dev/hidraw%d", d->number - 1);
+    snprintf(d->wire.devnode, sizeof(d->wire.devnode), "/dev/hidraw%d", d->number - 1);
     snprintf(d->hid_path, sizeof(d->hid_path), "/devices/virtual/misc/uhid/%04X:%04X:%04X.%04X",
              m->bus, m->vendor, m->product, d->number);
     snprintf(d->hidraw_path, sizeof(d->hidraw_path), "%s/hidraw/hidraw%d", d->hid_path,
              d->number - 1);
-    waiter_lock(&d->waiter);
-    d->plugged = true;
-    waiter_wake(&d->waiter);
-    waiter_unlock(&d->waiter);
+    if (!wire_device_attach(&d->wire, err))
+        return false;
+    waiter_lock(&d->wire.waiter);
+    d->wire.plugged = true;
+    waiter_wake(&d->wire.waiter);
+    waiter_unlock(&d->wire.waiter);
     if (show(d, err))
         return true;
-    d->plugged = false;
-    node_close(&d->node);
+    d->wire.plugged = false;
+    wire_device_hide(&d->wire);
     return false;
 }
 
 void hid_unplug(struct hid_device_emulated *device)
 {
     struct hid_device_emulated *d = device;
-    if (!d->plugged)
+    if (!d->wire.plugged)
         return;
-    waiter_lock(&d->waiter);
-    d->plugged = false;
+    waiter_lock(&d->wire.waiter);
+    d->wire.plugged = false;
     d->queued = 0;
     if (d->reader)
         umockdev_ioctl_client_complete(d->reader, -1, EIO);
     d->reader = NULL;
-    waiter_unlock(&d->waiter);
+    waiter_unlock(&d->wire.waiter);
     remove_from_sysfs(d, d->hidraw_path);
     remove_from_sysfs(d, d->hid_path);
     remove_number_link(d);
-    umockdev_testbed_detach_ioctl(d->testbed, d->devnode, NULL);
-    waiter_lock(&d->waiter);
-    node_close(&d->node);
-    waiter_unlock(&d->waiter);
+    wire_device_hide(&d->wire);
 }
 
 struct hid_device_emulated *hid_emulate(UMockdevTestbed *testbed, const struct hid_model *model,
@@ -363,39 +323,32 @@ struct hid_device_emulated *hid_emulate(UMockdevTestbed *testbed, const struct h
         fail(err, ERROR_SYSTEM, "out of memory");
         return NULL;
     }
-    d->testbed = testbed;
     d->model = *model;
-    d->node.master = d->node.slave = -1;
-    noise_init(&d->noise, seed, 'h');
-    waiter_init(&d->waiter);
-    d->handler = umockdev_ioctl_base_new();
-    g_signal_connect(d->handler, "handle-ioctl", G_CALLBACK(on_ioctl), d);
-    g_signal_connect(d->handler, "handle-read", G_CALLBACK(on_read), d);
-    g_signal_connect(d->handler, "handle-write", G_CALLBACK(on_write), d);
-    g_signal_connect(d->handler, "client-connected", G_CALLBACK(on_connected), d);
-    g_signal_connect(d->handler, "client-vanished", G_CALLBACK(on_vanished), d);
-    d->running = pthread_create(&d->thread, NULL, run, d) == 0;
-    if (d->running)
+    bool started = wire_device_start(&d->wire, testbed, seed, 'h', pump, d, err);
+    g_signal_connect(d->wire.handler, "handle-ioctl", G_CALLBACK(on_ioctl), d);
+    g_signal_connect(d->wire.handler, "handle-read", G_CALLBACK(on_read), d);
+    g_signal_connect(d->wire.handler, "handle-write", G_CALLBACK(on_write), d);
+    g_signal_connect(d->wire.handler, "client-connected", G_CALLBACK(on_connected), d);
+    g_signal_connect(d->wire.handler, "client-vanished", G_CALLBACK(on_vanished), d);
+    if (started)
         return d;
-    fail(err, ERROR_SYSTEM, "starting a thread");
     hid_emulation_end(d);
     return NULL;
 }
 
 void hid_set_fault(struct hid_device_emulated *device, enum wire_fault fault)
 {
-    waiter_lock(&device->waiter);
-    device->fault = fault;
-    waiter_unlock(&device->waiter);
+    waiter_lock(&device->wire.waiter);
+    device->wire.fault = fault;
+    waiter_unlock(&device->wire.waiter);
 }
 
-void hid_with_model(struct hid_device_emulated *device, void (*act)(void *context),
-                    void *context)
+void hid_with_model(struct hid_device_emulated *device, void (*act)(void *context), void *context)
 {
-    waiter_lock(&device->waiter);
+    waiter_lock(&device->wire.waiter);
     act(context);
-    waiter_wake(&device->waiter);
-    waiter_unlock(&device->waiter);
+    waiter_wake(&device->wire.waiter);
+    waiter_unlock(&device->wire.waiter);
 }
 
 void hid_emulation_end(struct hid_device_emulated *device)
@@ -404,15 +357,6 @@ void hid_emulation_end(struct hid_device_emulated *device)
     if (!d)
         return;
     hid_unplug(d);
-    if (d->running) {
-        waiter_lock(&d->waiter);
-        d->stopping = true;
-        waiter_wake(&d->waiter);
-        waiter_unlock(&d->waiter);
-        pthread_join(d->thread, NULL);
-    }
-    g_signal_handlers_disconnect_by_data(d->handler, d);
-    g_object_unref(d->handler);
-    waiter_fini(&d->waiter);
+    wire_device_end(&d->wire);
     free(d);
 }

@@ -2,16 +2,14 @@
 #include "simulator/usb_device.h"
 
 #include <linux/usbdevice_fs.h>
-#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/ioctl.h>
 
 #include "base/clock.h"
+#include "simulator/wire_device.h"
 #include "simulator/wire_fault.h"
-#include "simulator/wire_node.h"
-#include "simulator/wire_wait.h"
 
 enum { URBS = 64, FIRST_NUMBER = 2, SETUP_SIZE = 8, DESCRIPTOR_DEVICE = 18 };
 
@@ -33,21 +31,12 @@ struct urbs {
 };
 
 struct usb_device {
-    UMockdevTestbed *testbed;
-    UMockdevIoctlBase *handler;
-    struct usb_model model;
-    struct node node;
-    char devnode[32];
+    struct wire_device wire; // its lock guards what follows the number
     int number;
-
-    struct waiter waiter; // its lock guards everything below and the model
-    pthread_t thread;
-    bool running, stopping, plugged;
+    struct usb_model model;
     struct urbs pending, done;
-    enum wire_fault fault;
     bool stall_armed;
     uint32_t halted; // bit n: IN endpoint n stalled by a fault
-    struct noise noise;
 };
 
 // ---- request blocks ------------------------------------------------------------
@@ -76,7 +65,7 @@ static void finish(struct usb_device *d, int at, int status)
         drop(&urb);
     else
         d->done.items[d->done.count++] = urb;
-    node_set_writable(&d->node, true);
+    node_set_writable(&d->wire.node, true);
 }
 
 static int find(const struct urbs *urbs, const UMockdevIoctlClient *owner, unsigned long address)
@@ -118,7 +107,7 @@ static int next_packet(struct usb_device *d, uint8_t endpoint, int64_t now_ns,
     if (d->halted & bit)
         return -EPIPE;
     int size = d->model.in(d->model.context, endpoint, now_ns, packet, again_ns);
-    if (size < 0 || d->fault == WIRE_FINE)
+    if (size < 0 || d->wire.fault == WIRE_FINE)
         return size;
     if (d->stall_armed) {
         d->stall_armed = false;
@@ -126,10 +115,10 @@ static int next_packet(struct usb_device *d, uint8_t endpoint, int64_t now_ns,
         drain(d, endpoint, now_ns);
         return -EPIPE;
     }
-    if (d->fault == WIRE_SHORT || d->fault == WIRE_SILENT)
+    if (d->wire.fault == WIRE_SHORT || d->wire.fault == WIRE_SILENT)
         drain(d, endpoint, now_ns);
-    size = (int)fault_on(d->fault, &d->noise, packet, (size_t)size);
-    return size == 0 && d->fault == WIRE_SILENT ? -EAGAIN : size;
+    size = (int)fault_on(d->wire.fault, &d->wire.noise, packet, (size_t)size);
+    return size == 0 && d->wire.fault == WIRE_SILENT ? -EAGAIN : size;
 }
 
 // 1 = goes on waiting, else the status it ends with.
@@ -220,8 +209,9 @@ static int transfer(struct usb_device *d, struct urb *urb, int64_t now_ns, int64
 
 // Moves every transfer as far as it goes; those of one endpoint wait for each
 // other. Returns when to come back.
-static int64_t pump(struct usb_device *d)
+static int64_t pump(void *owner)
 {
+    struct usb_device *d = owner;
     int64_t now_ns = clock_now_ns(), again_ns = INT64_MAX;
     bool busy[256] = {false};
     for (int i = 0; i < d->pending.count;) {
@@ -237,18 +227,6 @@ static int64_t pump(struct usb_device *d)
         }
     }
     return again_ns;
-}
-
-static void *run(void *argument)
-{
-    struct usb_device *d = argument;
-    waiter_lock(&d->waiter);
-    while (!d->stopping) {
-        int64_t again_ns = d->plugged ? pump(d) : INT64_MAX;
-        waiter_wait(&d->waiter, again_ns);
-    }
-    waiter_unlock(&d->waiter);
-    return NULL;
 }
 
 // ---- usbfs -----------------------------------------------------------------------
@@ -267,8 +245,8 @@ static int submit(struct usb_device *d, UMockdevIoctlClient *client, UMockdevIoc
     urb.endpoint = u->endpoint;
     urb.length = u->buffer_length > 0 ? (size_t)u->buffer_length : 0;
     if (urb.length)
-        urb.buffer = umockdev_ioctl_data_resolve(
-            urb.data, offsetof(struct usbdevfs_urb, buffer), urb.length, NULL);
+        urb.buffer = umockdev_ioctl_data_resolve(urb.data, offsetof(struct usbdevfs_urb, buffer),
+                                                 urb.length, NULL);
     urb.received = malloc(urb.length + 1);
     if ((urb.length && !urb.buffer) || !urb.received) {
         drop(&urb);
@@ -276,7 +254,7 @@ static int submit(struct usb_device *d, UMockdevIoctlClient *client, UMockdevIoc
     }
     d->pending.items[d->pending.count++] = urb;
     pump(d);
-    waiter_wake(&d->waiter);
+    waiter_wake(&d->wire.waiter);
     return 0;
 }
 
@@ -284,7 +262,7 @@ static int reap(struct usb_device *d, UMockdevIoctlClient *client, UMockdevIoctl
 {
     int at = find(&d->done, client, 0);
     if (at < 0)
-        return d->plugged ? -EAGAIN : -ENODEV;
+        return d->wire.plugged ? -EAGAIN : -ENODEV;
     UMockdevIoctlData *pointer = umockdev_ioctl_data_resolve(arg, 0, sizeof(void *), NULL);
     if (!pointer)
         return -EFAULT;
@@ -298,7 +276,7 @@ static int reap(struct usb_device *d, UMockdevIoctlClient *client, UMockdevIoctl
     umockdev_ioctl_data_set_ptr(pointer, 0, urb.data);
     drop(&urb);
     g_object_unref(pointer);
-    node_set_writable(&d->node, d->done.count > 0);
+    node_set_writable(&d->wire.node, d->done.count > 0);
     return 0;
 }
 
@@ -345,7 +323,7 @@ static int answer(struct usb_device *d, UMockdevIoctlClient *client)
     gulong request = umockdev_ioctl_client_get_request(client);
     if (request == USBDEVFS_REAPURBNDELAY || request == USBDEVFS_REAPURB)
         return reap(d, client, arg);
-    if (!d->plugged)
+    if (!d->wire.plugged)
         return -ENODEV;
     switch (request) {
     case USBDEVFS_SUBMITURB:
@@ -374,9 +352,9 @@ static gboolean on_ioctl(UMockdevIoctlBase *handler, UMockdevIoctlClient *client
 {
     (void)handler;
     struct usb_device *d = data;
-    waiter_lock(&d->waiter);
+    waiter_lock(&d->wire.waiter);
     int result = answer(d, client);
-    waiter_unlock(&d->waiter);
+    waiter_unlock(&d->wire.waiter);
     umockdev_ioctl_client_complete(client, result < 0 ? -1 : 0, result < 0 ? -result : 0);
     return TRUE;
 }
@@ -385,10 +363,10 @@ static void on_vanished(UMockdevIoctlBase *handler, UMockdevIoctlClient *client,
 {
     (void)handler;
     struct usb_device *d = data;
-    waiter_lock(&d->waiter);
+    waiter_lock(&d->wire.waiter);
     drop_of(&d->pending, client);
     drop_of(&d->done, client);
-    waiter_unlock(&d->waiter);
+    waiter_unlock(&d->wire.waiter);
 }
 
 // ---- the plug ----------------------------------------------------------------------
@@ -418,64 +396,48 @@ static void describe(const struct usb_device *d, GString *text)
 
 static bool show(struct usb_device *d, struct error *err)
 {
-    GError *problem = NULL;
-    if (!umockdev_testbed_attach_ioctl(d->testbed, d->devnode, d->handler, &problem)) {
-        fail(err, ERROR_SYSTEM, "emulating %s: %s", d->devnode, problem->message);
-        g_error_free(problem);
-        return false;
-    }
     GString *text = g_string_new(NULL);
     describe(d, text);
-    bool added = umockdev_testbed_add_from_string(d->testbed, text->str, &problem);
-    g_string_free(text, TRUE);
-    if (added && node_link(&d->node, d->testbed, d->devnode, err)) {
-        umockdev_testbed_uevent(d->testbed, SYSFS, "add");
-        return true;
-    }
-    if (!added) {
-        fail(err, ERROR_SYSTEM, "emulating %s: %s", d->devnode, problem->message);
-        g_error_free(problem);
-    }
-    umockdev_testbed_detach_ioctl(d->testbed, d->devnode, NULL);
-    return false;
+    if (!wire_device_add(&d->wire, text, err) ||
+        !node_link(&d->wire.node, d->wire.testbed, d->wire.devnode, err))
+        return false;
+    umockdev_testbed_uevent(d->wire.testbed, SYSFS, "add");
+    return true;
 }
 
 bool usb_device_plug(struct usb_device *device, struct error *err)
 {
     struct usb_device *d = device;
-    if (d->plugged)
+    if (d->wire.plugged)
         return true;
-    if (!node_open(&d->node, err))
+    snprintf(d->wire.devnode, sizeof(d->wire.devnode), "/dev/bus/usb/001/%03d", ++d->number);
+    if (!wire_device_attach(&d->wire, err))
         return false;
-    snprintf(d->devnode, sizeof(d->devnode), "/dev/bus/usb/001/%03d", ++d->number);
-    waiter_lock(&d->waiter);
-    node_set_writable(&d->node, false);
+    waiter_lock(&d->wire.waiter);
+    node_set_writable(&d->wire.node, false);
     d->halted = 0;
-    d->plugged = true;
-    waiter_unlock(&d->waiter);
+    d->wire.plugged = true;
+    waiter_unlock(&d->wire.waiter);
     if (show(d, err))
         return true;
-    d->plugged = false;
-    node_close(&d->node);
+    d->wire.plugged = false;
+    wire_device_hide(&d->wire);
     return false;
 }
 
 void usb_device_unplug(struct usb_device *device)
 {
     struct usb_device *d = device;
-    if (!d->plugged)
+    if (!d->wire.plugged)
         return;
-    waiter_lock(&d->waiter);
-    d->plugged = false;
+    waiter_lock(&d->wire.waiter);
+    d->wire.plugged = false;
     while (d->pending.count > 0)
         finish(d, 0, -ESHUTDOWN);
-    waiter_unlock(&d->waiter);
-    umockdev_testbed_uevent(d->testbed, SYSFS, "remove");
-    umockdev_testbed_remove_device(d->testbed, SYSFS);
-    umockdev_testbed_detach_ioctl(d->testbed, d->devnode, NULL);
-    waiter_lock(&d->waiter);
-    node_close(&d->node);
-    waiter_unlock(&d->waiter);
+    waiter_unlock(&d->wire.waiter);
+    umockdev_testbed_uevent(d->wire.testbed, SYSFS, "remove");
+    umockdev_testbed_remove_device(d->wire.testbed, SYSFS);
+    wire_device_hide(&d->wire);
 }
 
 struct usb_device *usb_device_create(UMockdevTestbed *testbed, const struct usb_model *model,
@@ -486,30 +448,24 @@ struct usb_device *usb_device_create(UMockdevTestbed *testbed, const struct usb_
         fail(err, ERROR_SYSTEM, "out of memory");
         return NULL;
     }
-    d->testbed = testbed;
     d->model = *model;
     d->number = FIRST_NUMBER - 1;
-    d->node.master = d->node.slave = -1;
-    noise_init(&d->noise, seed, 'u');
-    waiter_init(&d->waiter);
-    d->handler = umockdev_ioctl_base_new();
-    g_signal_connect(d->handler, "handle-ioctl", G_CALLBACK(on_ioctl), d);
-    g_signal_connect(d->handler, "client-vanished", G_CALLBACK(on_vanished), d);
-    d->running = pthread_create(&d->thread, NULL, run, d) == 0;
-    if (d->running)
+    bool started = wire_device_start(&d->wire, testbed, seed, 'u', pump, d, err);
+    g_signal_connect(d->wire.handler, "handle-ioctl", G_CALLBACK(on_ioctl), d);
+    g_signal_connect(d->wire.handler, "client-vanished", G_CALLBACK(on_vanished), d);
+    if (started)
         return d;
-    fail(err, ERROR_SYSTEM, "starting a thread");
     usb_device_destroy(d);
     return NULL;
 }
 
 void usb_device_set_fault(struct usb_device *device, enum wire_fault fault)
 {
-    waiter_lock(&device->waiter);
-    device->fault = fault;
+    waiter_lock(&device->wire.waiter);
+    device->wire.fault = fault;
     device->stall_armed = fault == WIRE_STALL;
-    waiter_wake(&device->waiter);
-    waiter_unlock(&device->waiter);
+    waiter_wake(&device->wire.waiter);
+    waiter_unlock(&device->wire.waiter);
 }
 
 void usb_device_destroy(struct usb_device *device)
@@ -518,17 +474,8 @@ void usb_device_destroy(struct usb_device *device)
     if (!d)
         return;
     usb_device_unplug(d);
-    if (d->running) {
-        waiter_lock(&d->waiter);
-        d->stopping = true;
-        waiter_wake(&d->waiter);
-        waiter_unlock(&d->waiter);
-        pthread_join(d->thread, NULL);
-    }
-    g_signal_handlers_disconnect_by_data(d->handler, d);
-    g_object_unref(d->handler);
+    wire_device_end(&d->wire);
     for (; d->done.count > 0; d->done.count--)
         drop(&d->done.items[d->done.count - 1]);
-    waiter_fini(&d->waiter);
     free(d);
 }
