@@ -133,28 +133,22 @@ static int parse(int argc, char **argv, struct options *o)
 struct way {
     enum mode mode;
     const struct spectrum *lamp;
-    struct band_set set;
+    const struct band_set *set; // unless full
     struct band_matrix matrix[OBSERVER_COUNT];
 };
 
-static bool way_init(struct way *w, const struct options *o, const struct spectrum *lamp,
-                     struct error *err)
+static bool way_init(struct way *w, const struct options *o, const struct band_set *set,
+                     const struct spectrum *lamp, struct error *err)
 {
     w->mode = o->mode;
     w->lamp = lamp;
-    if (w->mode == MODE_FULL)
-        return true;
-    if (!(o->bands ? bands_named(o->bands, &w->set, err)
-                   : band_set_shipped(BANDS_SHIPPED, &w->set, err)))
-        return false;
+    w->set = set;
     for (enum observer i = 0; i < OBSERVER_COUNT; i++) {
-        if (i != o->observer && i != OBSERVER_1931_2)
+        if (w->mode == MODE_FULL || (i != o->observer && i != OBSERVER_1931_2))
             continue;
-        bool ok = w->mode == MODE_BANDS
-                      ? band_matrix_adapted(&w->set, lamp, i, &w->matrix[i], err)
-                      : band_matrix_product(&w->set, lamp, i, &w->matrix[i], err);
-        if (!ok)
-            return while_doing(err, "%s", o->light);
+        if (!(w->mode == MODE_BANDS ? band_matrix_adapted(set, lamp, i, &w->matrix[i], err)
+                                    : band_matrix_product(set, lamp, i, &w->matrix[i], err)))
+            return false;
     }
     return true;
 }
@@ -164,7 +158,7 @@ static struct xyz way_xyz(const struct way *w, const struct spectrum *reflectanc
 {
     if (w->mode == MODE_FULL)
         return xyz_relative(w->lamp, reflectance, observer);
-    struct bands c = bands_of(&w->set, reflectance);
+    struct bands c = bands_of(w->set, reflectance);
     return band_xyz(&w->matrix[observer], &c);
 }
 
@@ -199,13 +193,13 @@ static struct spectrum perfect_white(void)
     return s;
 }
 
-static bool rows_of_lamps(const struct options *o, const struct spectra *lamps, struct rows *out,
-                          struct error *err)
+static bool rows_of_lamps(const struct options *o, const struct band_set *set,
+                          const struct spectra *lamps, struct rows *out, struct error *err)
 {
     struct spectrum white = perfect_white();
     for (int i = 0; i < lamps->count; i++) {
         struct way way;
-        if (!way_init(&way, o, &lamps->spectra[i], err) ||
+        if (!way_init(&way, o, set, &lamps->spectra[i], err) ||
             !fill_row(&out->rows[i], lamps->names[i], &way, &white, o->observer, err))
             return while_doing(err, "%s: %s", o->light, lamps->names[i]);
         out->count++;
@@ -213,15 +207,16 @@ static bool rows_of_lamps(const struct options *o, const struct spectra *lamps, 
     return true;
 }
 
-static bool rows_of_surfaces(const struct options *o, const struct spectra *lamps,
-                             const struct spectra *surfaces, struct rows *out, struct error *err)
+static bool rows_of_surfaces(const struct options *o, const struct band_set *set,
+                             const struct spectra *lamps, const struct spectra *surfaces,
+                             struct rows *out, struct error *err)
 {
     struct way way;
     if (lamps->count != 1)
         return fail(err, ERROR_DATA, "%s: %d spectra; with --reflectance it must be one", o->light,
                     lamps->count);
-    if (!way_init(&way, o, &lamps->spectra[0], err))
-        return false;
+    if (!way_init(&way, o, set, &lamps->spectra[0], err))
+        return while_doing(err, "%s", o->light);
     for (int i = 0; i < surfaces->count; i++) {
         if (!fill_row(&out->rows[i], surfaces->names[i], &way, &surfaces->spectra[i], o->observer,
                       err))
@@ -249,10 +244,18 @@ static bool load_lamps(const char *text, struct spectra *out, struct error *err)
     return true;
 }
 
+static bool load_bands(const struct options *o, struct band_set *set, struct error *err)
+{
+    if (o->bands)
+        return bands_named(o->bands, set, err) || while_doing(err, "--bands");
+    return band_set_shipped(BANDS_SHIPPED, set, err);
+}
+
 static bool compute(const struct options *o, struct rows *out, struct error *err)
 {
     struct spectra lamps = {0}, surfaces = {0};
-    bool ok = load_lamps(o->light, &lamps, err) &&
+    struct band_set set;
+    bool ok = load_bands(o, &set, err) && load_lamps(o->light, &lamps, err) &&
               (!o->reflectance || spectra_load(o->reflectance, true, &surfaces, err));
     if (ok) {
         int count = o->reflectance ? surfaces.count : lamps.count;
@@ -260,8 +263,8 @@ static bool compute(const struct options *o, struct rows *out, struct error *err
         ok = out->rows || fail(err, ERROR_SYSTEM, "out of memory");
     }
     if (ok)
-        ok = o->reflectance ? rows_of_surfaces(o, &lamps, &surfaces, out, err)
-                            : rows_of_lamps(o, &lamps, out, err);
+        ok = o->reflectance ? rows_of_surfaces(o, &set, &lamps, &surfaces, out, err)
+                            : rows_of_lamps(o, &set, &lamps, out, err);
     snprintf(out->warning, sizeof out->warning, "%s", surfaces.warning);
     spectra_fini(&lamps);
     spectra_fini(&surfaces);

@@ -5,9 +5,11 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "calibration/commands.h"
 #include "calibration/display_fit.h"
+#include "calibration/lines.h"
 #include "config/display_file.h"
 
 // ---- fit -------------------------------------------------------------------
@@ -32,9 +34,28 @@ static void warn_misfit(const struct display_fit *f)
     fputc('\n', stderr);
 }
 
+// Whether the file's white was warned about.
+static bool warn_white(const struct measurements *m)
+{
+    bool wrong = m->white_error > WHITE_ERROR_WARN;
+    if (wrong)
+        fprintf(stderr,
+                "boothcal: warning: %s: the patch 100 100 100 is %.1f %% from %s (sound below %g "
+                "%%)\n",
+                m->path, 100 * m->white_error, m->absolute ? "LUMINANCE_XYZ_CDM2" : "Y = 100",
+                100 * WHITE_ERROR_WARN);
+    return wrong;
+}
+
 static int warn(const struct measurements *m, const struct display_model *model,
                 const struct display_fit *f)
 {
+    bool wrong_white = warn_white(m);
+    if (f->disordered)
+        fprintf(stderr,
+                "boothcal: warning: %s: red's x, green's Y or blue's Z is not the largest of the "
+                "three primaries: are columns of RGB or XYZ exchanged?\n",
+                m->path);
     if (f->misfit)
         warn_misfit(f);
     if (f->ill_conditioned)
@@ -51,8 +72,9 @@ static int warn(const struct measurements *m, const struct display_model *model,
         fprintf(stderr,
                 "boothcal: warning: %s: no LUMINANCE_XYZ_CDM2: white is taken as %.5g cd/m2\n",
                 m->path, m->white.Y);
-    return f->misfit || f->ill_conditioned || f->drifted || !m->absolute ? COMMAND_WARNED
-                                                                         : COMMAND_FINE;
+    bool any = wrong_white || f->disordered || f->misfit || f->ill_conditioned || f->drifted ||
+               !m->absolute;
+    return any ? COMMAND_WARNED : COMMAND_FINE;
 }
 
 static void print_fit(const struct measurements *m, const struct display_model *model,
@@ -100,6 +122,12 @@ static int fit_to(const char *out, const struct measurements *m)
     return code;
 }
 
+static bool same_file(const char *a, const char *b)
+{
+    struct stat x, y;
+    return !stat(a, &x) && !stat(b, &y) && x.st_dev == y.st_dev && x.st_ino == y.st_ino;
+}
+
 static int command_fit(int argc, char **argv)
 {
     const char *in = NULL;
@@ -114,6 +142,9 @@ static int command_fit(int argc, char **argv)
     }
     if (!in || !out || !*in || !*out)
         return command_bad_usage("usage: boothcal display fit TRAIN.ti3 -o D.ini");
+    if (same_file(in, out))
+        return command_bad_usage("boothcal display fit: -o %s would overwrite the measurements",
+                                 out);
     struct error err;
     struct measurements m = {0};
     if (!measurements_load(in, &m, &err))
@@ -139,21 +170,49 @@ static void print_check(const struct summary *s, bool json)
     json_decref(o);
 }
 
-static bool check(const char *model_path, const char *ti3, struct summary *s, struct error *err)
+static bool differences(const struct measurements *m, const struct display_model *model,
+                        struct summary *s, struct error *err)
+{
+    double *de00 = malloc((size_t)m->count * sizeof *de00);
+    if (!de00)
+        return fail(err, ERROR_SYSTEM, "out of memory for %d patches", m->count);
+    bool ok = display_differences(m, model, de00, err);
+    if (ok)
+        *s = summarise(de00, m->count);
+    free(de00);
+    return ok;
+}
+
+// Measurements that do not say how many cd/m2: the model's white is made theirs.
+static void make_relative(struct display_model *model, const struct measurements *m)
+{
+    double k = m->white.Y / display_forward(model, (struct counts){1, 1, 1}).Y;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 4; j++)
+            model->matrix[i][j] *= k;
+    fprintf(stderr,
+            "boothcal: warning: %s: no LUMINANCE_XYZ_CDM2: the model is compared at the white of "
+            "these measurements\n",
+            m->path);
+}
+
+static int check(const char *model_path, const char *ti3, struct summary *s, struct error *err)
 {
     struct measurements m = {0};
     struct display_model *model = malloc(sizeof *model);
-    bool ok = model ? display_load(model_path, model, NULL, err) && measurements_load(ti3, &m, err)
-                    : fail(err, ERROR_SYSTEM, "out of memory");
-    double *de00 = ok ? malloc((size_t)m.count * sizeof *de00) : NULL;
-    if (ok && !de00)
-        ok = fail(err, ERROR_SYSTEM, "out of memory");
-    if (ok && (ok = display_differences(&m, model, de00, err)))
-        *s = summarise(de00, m.count);
-    free(de00);
+    int code = COMMAND_USAGE;
+    if (!model)
+        fail(err, ERROR_SYSTEM, "out of memory");
+    else if (display_load(model_path, model, NULL, err) && measurements_load(ti3, &m, err)) {
+        bool wrong_white = warn_white(&m);
+        if (!m.absolute)
+            make_relative(model, &m);
+        if (differences(&m, model, s, err))
+            code = wrong_white || !m.absolute ? COMMAND_WARNED : COMMAND_FINE;
+    }
     free(model);
     measurements_fini(&m);
-    return ok;
+    return code;
 }
 
 static int command_check(int argc, char **argv)
@@ -172,32 +231,15 @@ static int command_check(int argc, char **argv)
     if (count != 2)
         return command_bad_usage("usage: boothcal display check D.ini TEST.ti3 [--json]");
     struct error err;
-    struct summary s;
-    if (!check(files[0], files[1], &s, &err))
+    struct summary s = {0};
+    int code = check(files[0], files[1], &s, &err);
+    if (code == COMMAND_USAGE)
         return command_bad_input(&err);
     print_check(&s, json);
-    return COMMAND_FINE;
+    return code;
 }
 
 // ---- forward, inverse ------------------------------------------------------
-
-static bool three_numbers(const char *line, double v[3], struct error *err)
-{
-    const char *gap = " \t,;\r\n";
-    const char *at = line + strspn(line, gap);
-    for (int i = 0; i < 3; i++) {
-        char *end;
-        int size = (int)strcspn(at, gap);
-        v[i] = strtod(at, &end);
-        if (!size)
-            return fail(err, ERROR_DATA, "%d number(s), not three", i);
-        if (end != at + size || !isfinite(v[i]))
-            return fail(err, ERROR_DATA, "\"%.*s\" is not a finite number", size > 40 ? 40 : size,
-                        at);
-        at = end + strspn(end, gap);
-    }
-    return !*at || fail(err, ERROR_DATA, "more than three numbers");
-}
 
 static bool one_forward(const struct display_model *model, const double v[3], FILE *out,
                         struct error *err)
@@ -220,36 +262,35 @@ static bool one_inverse(const struct display_model *model, const double v[3], FI
     return true;
 }
 
-typedef bool one_line(const struct display_model *, const double v[3], FILE *, struct error *);
+struct filter {
+    const char *names; // of the numbers of a line
+    bool (*one)(const struct display_model *, const double v[3], FILE *, struct error *);
+};
 
-static bool all_lines(const struct display_model *model, one_line *one, FILE *out,
+static bool all_lines(const struct display_model *model, const struct filter *filter, FILE *out,
                       struct error *err)
 {
-    char *line = NULL;
-    size_t room = 0;
-    bool ok = true;
-    for (int number = 1; ok && getline(&line, &room, stdin) >= 0; number++) {
+    struct lines l = {.in = stdin, .name = "stdin"};
+    bool end = false, ok = true;
+    while (ok && lines_next(&l, &end, err)) {
         double v[3];
-        if (line[strspn(line, " \t\r\n")] == 0 || *line == '#')
-            continue;
-        ok = (three_numbers(line, v, err) && one(model, v, out, err)) ||
-             while_doing(err, "stdin:%d", number);
+        ok = (line_numbers(l.text, 3, filter->names, v, err) && filter->one(model, v, out, err)) ||
+             while_doing(err, "stdin:%d", l.number);
     }
-    if (ok && ferror(stdin))
-        ok = fail_errno(err, "stdin");
-    free(line);
-    return ok;
+    lines_fini(&l);
+    return ok && end;
 }
 
 // Nothing is printed before the last line was understood.
-static bool print_lines(const struct display_model *model, one_line *one, struct error *err)
+static bool print_lines(const struct display_model *model, const struct filter *filter,
+                        struct error *err)
 {
     char *text = NULL;
     size_t size = 0;
     FILE *out = open_memstream(&text, &size);
     if (!out)
         return fail_errno(err, "no memory for the answer");
-    bool ok = all_lines(model, one, out, err);
+    bool ok = all_lines(model, filter, out, err);
     if (fclose(out) && ok)
         ok = fail_errno(err, "no memory for the answer");
     if (ok)
@@ -258,7 +299,7 @@ static bool print_lines(const struct display_model *model, one_line *one, struct
     return ok;
 }
 
-static int run_lines(int argc, char **argv, one_line *one)
+static int run_lines(int argc, char **argv, const struct filter *filter)
 {
     if (argc != 2 || argv[1][0] == '-')
         return command_bad_usage("usage: boothcal display %s D.ini <LINES", argv[0]);
@@ -268,35 +309,54 @@ static int run_lines(int argc, char **argv, one_line *one)
         fail(&err, ERROR_SYSTEM, "out of memory");
         return command_failed(&err);
     }
-    bool ok = display_load(argv[1], model, NULL, &err) && print_lines(model, one, &err);
+    bool ok = display_load(argv[1], model, NULL, &err) && print_lines(model, filter, &err);
     free(model);
     return ok ? COMMAND_FINE : command_bad_input(&err);
 }
 
 static int command_forward(int argc, char **argv)
 {
-    return run_lines(argc, argv, one_forward);
+    static const struct filter FORWARD = {"three numbers, R G B", one_forward};
+    return run_lines(argc, argv, &FORWARD);
 }
 
 static int command_inverse(int argc, char **argv)
 {
-    return run_lines(argc, argv, one_inverse);
+    static const struct filter INVERSE = {"three numbers, X Y Z", one_inverse};
+    return run_lines(argc, argv, &INVERSE);
 }
 
 int command_display(int argc, char **argv)
 {
     static const struct command TABLE[] = {
         {"fit", command_fit, "TRAIN.ti3 -o D.ini",
-         "Fits three curves and a 3x4 matrix to measured patches. Exit 3: done, with a warning\n"
-         "      (primaries much alike, the panel is no such model, white drifted, no absolute "
-         "white)."},
+         "Fits three curves and a 3x4 matrix to measured patches.\n"
+         "\n"
+         "  TRAIN.ti3  RGB_R RGB_G RGB_B (0..100) and XYZ_X XYZ_Y XYZ_Z of at least 20 patches\n"
+         "  -o D.ini   where the model goes\n"
+         "  --help\n"
+         "\n"
+         "Exit 3: done, with a warning (primaries much alike or exchanged, the panel is no such\n"
+         "model, white drifted or contradicts LUMINANCE_XYZ_CDM2, no absolute white)."},
         {"check", command_check, "D.ini TEST.ti3 [--json]",
-         "CIEDE2000 of a model against measured patches: mean, median, p95, max, n."},
+         "CIEDE2000 of a model against measured patches: mean, median, p95, max, n.\n"
+         "\n"
+         "  D.ini      model, as display fit writes it\n"
+         "  TEST.ti3   measured patches; without LUMINANCE_XYZ_CDM2 both are compared at the same\n"
+         "             white, with exit 3\n"
+         "  --json     one JSON object\n"
+         "  --help"},
         {"forward", command_forward, "D.ini",
-         "Reads \"R G B\" (0..100) a line, writes \"X Y Z\" in cd/m2 a line."},
+         "Reads \"R G B\" (0..100) a line, writes \"X Y Z\" in cd/m2 a line.\n"
+         "\n"
+         "  D.ini      model, as display fit writes it\n"
+         "  --help"},
         {"inverse", command_inverse, "D.ini",
          "Reads \"X Y Z\" in cd/m2 a line, writes \"R G B\" (0..100) a line; a fourth word\n"
-         "      \"out-of-gamut\" stands behind colours that had to be clipped."},
+         "      \"out-of-gamut\" stands behind colours that had to be clipped.\n"
+         "\n"
+         "  D.ini      model, as display fit writes it\n"
+         "  --help"},
         {NULL, NULL, NULL, NULL},
     };
     return command_run("boothcal display", TABLE, argc, argv);

@@ -303,6 +303,20 @@ static void look_at_primaries(const struct measurements *m, struct display_fit *
     found->additivity = found->primaries ? (r + g + b - 2 * black) / white - 1 : 0;
 }
 
+// Of any additive display red is the reddest primary, green the brightest, and
+// blue has most of Z.
+static bool disordered(const struct display_model *model)
+{
+    struct xyz p[3];
+    struct xy xy[3];
+    for (int c = 0; c < 3; c++) {
+        p[c] = (struct xyz){model->matrix[0][c], model->matrix[1][c], model->matrix[2][c]};
+        xy[c] = xy_of(p[c]);
+    }
+    return xy[0].x < fmax(xy[1].x, xy[2].x) || p[1].Y < fmax(p[0].Y, p[2].Y) ||
+           p[2].Z < fmax(p[0].Z, p[1].Z);
+}
+
 static bool judge(const struct measurements *m, const struct display_model *model,
                   struct display_fit *found, struct error *err)
 {
@@ -316,6 +330,7 @@ static bool judge(const struct measurements *m, const struct display_model *mode
     look_at_primaries(m, found);
     found->ill_conditioned = model->condition > CONDITION_WARN;
     found->misfit = found->de00.mean > MISFIT_MEAN || found->de00.p95 > MISFIT_P95;
+    found->disordered = disordered(model);
     found->drifted = m->white_drift > DRIFT_WARN;
     return compared;
 }

@@ -17,6 +17,8 @@ struct display_fit {
     double additivity;               // luminance of R + G + B - 2 black over white, less 1
     bool ill_conditioned;            // condition > 10: noise grows tenfold
     bool misfit;                     // mean > 0.6 or p95 > 2: no such model describes this panel
+    bool disordered;                 // red's x, green's Y or blue's Z is not the largest of the
+                                     // three: columns exchanged?
     bool drifted;                    // white moved by more than 3 % while measuring
 };
 

@@ -5,6 +5,7 @@
 
 static const double CONDITION_MOST = 50;
 static const double SLOPE_LEAST = 1e-6;
+static const double BELOW_ZERO_MOST = 0.05; // part of a primary's Y: noise of the fit
 
 #define real double
 #define curve_handle const double *
@@ -40,13 +41,26 @@ static bool matrix_check(const struct display_model *model, struct mat3 *left, s
     return true;
 }
 
+static bool primaries_check(const struct display_model *model, struct error *err)
+{
+    for (int c = 0; c < 3; c++) {
+        double X = model->matrix[0][c], Y = model->matrix[1][c], Z = model->matrix[2][c];
+        if (!(Y > 0 && fmin(X, Z) >= -BELOW_ZERO_MOST * Y))
+            return fail(err, ERROR_DATA,
+                        "matrix column %d: %s is %g %g %g cd/m2; allowed: Y above 0, X and Z not "
+                        "below -5 %% of it",
+                        c + 1, channel_names[c], X, Y, Z);
+    }
+    return true;
+}
+
 bool display_model_prepare(struct display_model *model, struct error *err)
 {
     struct mat3 left, inverse;
     for (int c = 0; c < 3; c++)
         if (!curve_check(model->curve[c], channel_names[c], err))
             return false;
-    if (!matrix_check(model, &left, err))
+    if (!matrix_check(model, &left, err) || !primaries_check(model, err))
         return false;
     double condition = mat3_condition(left);
     if (!(condition <= CONDITION_MOST) || !mat3_invert(left, &inverse))

@@ -30,8 +30,9 @@ struct display_model {
 };
 
 // Checks curves and matrix, fills inverse and condition. Refuses (DATA):
-// curves that do not rise, non-finite numbers, condition > 50. A condition
-// > 10 is the caller's to warn about.
+// curves that do not rise, non-finite numbers, a primary whose Y is not above 0
+// or whose X or Z is below -5 % of its Y, condition > 50. A condition > 10 is
+// the caller's to warn about.
 bool display_model_prepare(struct display_model *model, struct error *err);
 
 // Makes three curves strictly increasing: pool adjacent violators, then a

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "files/ini.h"
+#include "files/write.h"
 
 // What the file holds: the model with its curves node by node.
 struct display_file {
@@ -134,6 +135,49 @@ bool display_save(const char *path, const struct display_model *model,
     return saved;
 }
 
+// The node that display_model_prepare complains of, or -1.
+static int bad_node(const struct display_file *file)
+{
+    const int last = DISPLAY_NODES - 1;
+    for (int c = 0; c < 3; c++) {
+        if (file->nodes[0][c] != 0)
+            return 0;
+        if (file->nodes[last][c] != 1)
+            return last;
+        for (int k = 1; k <= last; k++)
+            if (!(file->nodes[k][c] > file->nodes[k - 1][c]))
+                return k;
+    }
+    return -1;
+}
+
+// Line of a key that the file holds, whose keys are all different.
+static int line_of_key(const char *path, const char *key)
+{
+    enum { BYTES_MOST = 1 << 24 };
+    size_t size, length = strlen(key);
+    char *text = file_read(path, BYTES_MOST, &size, NULL);
+    int line = 0;
+    bool found = false;
+    for (const char *at = text; at && !found; line++) {
+        at += strspn(at, " \t");
+        found = !strncmp(at, key, length) && at[length + strspn(at + length, " \t")] == '=';
+        const char *stop = strchr(at, '\n');
+        at = stop ? stop + 1 : NULL;
+    }
+    free(text);
+    return found ? line : 0;
+}
+
+// Puts file, line and section before what display_model_prepare said.
+static bool blame(const char *path, const struct display_file *file, struct error *err)
+{
+    int node = bad_node(file);
+    const char *key = node < 0 ? matrix_rows[0].name : file->node_names[node];
+    return while_doing(err, "%s:%d: [%s]", path, line_of_key(path, key),
+                       node < 0 ? "matrix" : "curves");
+}
+
 bool display_load(const char *path, struct display_model *model, struct display_origin *origin,
                   struct error *err)
 {
@@ -150,7 +194,7 @@ bool display_load(const char *path, struct display_model *model, struct display_
         for (int c = 0; c < 3; c++)
             loaded.curve[c][k] = file->nodes[k][c];
     if (fine && !display_model_prepare(&loaded, err))
-        fine = while_doing(err, "%s: [curves] and [matrix]", path);
+        fine = blame(path, file, err);
     if (fine) {
         *model = loaded;
         if (origin)

@@ -15,8 +15,8 @@ struct display_origin {
 bool display_save(const char *path, const struct display_model *model,
                   const struct display_origin *origin, struct error *err);
 
-// Loads and prepares. Refuses what display_model_prepare refuses, with file
-// and section. origin may be NULL.
+// Loads and prepares. Refuses what display_model_prepare refuses, with file,
+// line and section. origin may be NULL.
 bool display_load(const char *path, struct display_model *model, struct display_origin *origin,
                   struct error *err);
 

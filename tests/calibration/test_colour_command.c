@@ -370,6 +370,7 @@ static void bad_words_are_refused(void **state)
         {"spectrum --light A B", "B"},
         {"spectrum --light A --mode full --bands 6", "--bands"},
         {"spectrum --light A --bands 2", "3..16"},
+        {"spectrum --light A --bands 0", "boothcal: --bands: 0 bands: outside"},
         {"spectrum --light XYZ", "FL3.15"},
         {"spectrum --light D3000K", "4000"},
         {"spectrum --light /nowhere/lamp.csv", "/nowhere/lamp.csv"},

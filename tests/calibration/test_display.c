@@ -125,7 +125,7 @@ static void write_ti3(const char *keywords, const char *rows, int count)
     fclose(out);
 }
 
-static void write_panel(void)
+static void write_panel_as(const char *keywords, double scale)
 {
     struct measurements m = measured(0);
     char *rows = calloc(1, 400 * 120);
@@ -133,12 +133,17 @@ static void write_panel(void)
     for (int i = 0; i < m.count; i++) {
         struct measured_patch *p = &m.patches[i];
         used += (size_t)sprintf(rows + used, "%d %.7g %.7g %.7g %.7g %.7g %.7g\n", i + 1,
-                                100 * p->counts.r, 100 * p->counts.g, 100 * p->counts.b, p->xyz.X,
-                                p->xyz.Y, p->xyz.Z);
+                                100 * p->counts.r, 100 * p->counts.g, 100 * p->counts.b,
+                                scale * p->xyz.X, scale * p->xyz.Y, scale * p->xyz.Z);
     }
-    write_ti3("NORMALIZED_TO_Y_100 \"NO\"", rows, m.count);
+    write_ti3(keywords, rows, m.count);
     free(rows);
     measurements_fini(&m);
+}
+
+static void write_panel(void)
+{
+    write_panel_as("NORMALIZED_TO_Y_100 \"NO\"", 1);
 }
 
 static void refused(const char *keywords, const char *rows, int count, const char *says)
@@ -202,6 +207,41 @@ static void bad_files_are_refused_by_line_and_key(void **state)
     refused("NORMALIZED_TO_Y_100 \"MAYBE\"", white, 1, ":5: NORMALIZED_TO_Y_100: \"MAYBE\"");
     refused("NORMALIZED_TO_Y_100 \"YES\"", "1 100 100 100 300 320 330\n", 1, "320");
     refused("LUMINANCE_XYZ_CDM2 \"190 200 220\"\nNORMALIZED_TO_Y_100 \"NO\"", white, 1, "100");
+    refused("", "1 100 100 100 95 100 110\n2 50 50 50 20 1e300 20\n", 2, ":14: XYZ: 20 1e+300 20");
+    refused("", "1 100 100 100 95 1e300 110\n", 1, ":13: XYZ_Y");
+    refused("NORMALIZED_TO_Y_100 \"NO\"", "1 100 100 100 9e8 1e9 1e9\n", 1,
+            ":13: white: 1e+09 cd/m2 is outside 1..100000");
+    refused("LUMINANCE_XYZ_CDM2 \"9e-10 1e-9 1e-9\"", white, 1, ":5: white: 1e-09 cd/m2");
+}
+
+static void another_unit_of_rgb_is_named_as_such(void **state)
+{
+    (void)state;
+    struct measurements m;
+    refused("", "1 1 1 1 95 100 110\n2 0 0.5 0 30 50 20\n", 2, ":13: RGB_R RGB_G RGB_B");
+    refused("", "1 1 1 1 95 100 110\n2 0 0.5 0 30 50 20\n", 2, "0..100");
+    write_ti3("", "1 100 100 100 95 100 110\n2 0.5 0.5 0.5 0 0 0\n", 2);
+    assert_true(measurements_load(ti3, &m, NULL));
+    measurements_fini(&m);
+}
+
+static void the_white_rows_must_bear_the_luminance_out(void **state)
+{
+    (void)state;
+    struct measurements m;
+    static const char white[] = "1 100 100 100 95 100 110\n";
+    refused("LUMINANCE_XYZ_CDM2 \"220 200 190\"", white, 1, ":5: LUMINANCE_XYZ_CDM2: 220 200 190");
+    refused("LUMINANCE_XYZ_CDM2 \"190 200 190\"", white, 1, "190 200 220");
+    refused("LUMINANCE_XYZ_CDM2 \"84 89 98\"\nNORMALIZED_TO_Y_100 \"NO\"", white, 1, "10 %");
+    refused("", "1 100 100 100 104 111 120\n", 1, ":13: XYZ_Y: the patch 100 100 100 measured 111");
+    write_ti3("LUMINANCE_XYZ_CDM2 \"190 200 202\"", white, 1);
+    assert_true(measurements_load(ti3, &m, NULL));
+    assert_near(m.white_error, 220.0 / 202 - 1, PRINTED);
+    measurements_fini(&m);
+    write_ti3("LUMINANCE_XYZ_CDM2 \"190 200 220\"", white, 1);
+    assert_true(measurements_load(ti3, &m, NULL));
+    assert_near(m.white_error, 0, PRINTED);
+    measurements_fini(&m);
 }
 
 static void a_day_model_is_found_again(void **state)
@@ -251,6 +291,27 @@ static void a_panel_whose_channels_do_not_add_is_a_misfit(void **state)
     assert_true(found.misfit);
     assert_near(found.additivity, 1 / 0.75 - 1, 0.01); // black counts a little
     measurements_fini(&m);
+}
+
+static void exchanged_columns_show_in_the_primaries(void **state)
+{
+    (void)state;
+    for (int kind = 0; kind < 4; kind++) {
+        struct measurements m = measured(0);
+        struct display_model model;
+        struct display_fit found;
+        struct error err = {0};
+        for (int i = 0; i <= m.count; i++) {
+            struct xyz *c = i < m.count ? &m.patches[i].xyz : &m.white, v = *c;
+            *c = kind == 1   ? (struct xyz){v.Z, v.Y, v.X}
+                 : kind == 2 ? (struct xyz){v.Y, v.X, v.Z}
+                 : kind == 3 ? (struct xyz){v.X, v.Z, v.Y}
+                             : v;
+        }
+        assert_true(display_fit(&m, &model, &found, &err));
+        assert_int_equal(found.disordered, kind != 0);
+        measurements_fini(&m);
+    }
 }
 
 static void too_few_patches_decide_nothing(void **state)
@@ -329,6 +390,84 @@ static void the_commands_fit_and_refuse_with_their_exit_codes(void **state)
     assert_int_equal(run(5, check), COMMAND_USAGE);
 }
 
+static void the_measurements_are_not_overwritten(void **state)
+{
+    (void)state;
+    char *same[] = {"display", "fit", ti3, "-o", ti3, NULL};
+    struct measurements m;
+    write_panel();
+    assert_int_equal(run(5, same), COMMAND_USAGE);
+    assert_int_equal(symlink(ti3, ini), 0);
+    char *linked[] = {"display", "fit", ti3, "-o", ini, NULL};
+    assert_int_equal(run(5, linked), COMMAND_USAGE);
+    assert_int_equal(unlink(ini), 0);
+    assert_true(measurements_load(ti3, &m, NULL));
+    measurements_fini(&m);
+}
+
+static void a_white_that_is_a_little_wrong_is_a_warning(void **state)
+{
+    (void)state;
+    char *fit[] = {"display", "fit", ti3, "-o", ini, NULL};
+    char *check[] = {"display", "check", ini, ti3, NULL};
+    struct xyz white = panel((struct counts){1, 1, 1});
+    const struct {
+        double off;
+        int code;
+    } cases[] = {{1.02, COMMAND_FINE}, {1.05, COMMAND_WARNED}, {1.12, COMMAND_USAGE}};
+    for (int i = 0; i < 3; i++) {
+        char keywords[128];
+        snprintf(keywords, sizeof keywords,
+                 "NORMALIZED_TO_Y_100 \"NO\"\nLUMINANCE_XYZ_CDM2 \"%.4f %.4f %.4f\"",
+                 white.X * cases[i].off, white.Y * cases[i].off, white.Z * cases[i].off);
+        write_panel_as(keywords, 1);
+        assert_int_equal(run(5, fit), cases[i].code);
+        assert_int_equal(run(4, check), cases[i].code);
+    }
+    unlink(ini);
+}
+
+// Runs "check ini ti3 --json"; its mean.
+static double checked(int expected)
+{
+    char *check[] = {"display", "check", ini, ti3, "--json", NULL};
+    double mean = NAN;
+    fflush(stdout);
+    int out_kept = dup(1);
+    assert_non_null(freopen(answer, "w", stdout));
+    int code = run(5, check);
+    fflush(stdout);
+    dup2(out_kept, 1);
+    close(out_kept);
+    FILE *got = fopen(answer, "r");
+    assert_int_equal(fscanf(got, "{\"mean\": %lf", &mean), 1);
+    fclose(got);
+    assert_int_equal(code, expected);
+    return mean;
+}
+
+static void relative_measurements_are_checked_at_their_own_white(void **state)
+{
+    (void)state;
+    char *fit[] = {"display", "fit", ti3, "-o", ini, NULL};
+    write_panel();
+    assert_int_equal(run(5, fit), COMMAND_FINE);
+    double absolute = checked(COMMAND_FINE);
+    write_panel_as("", 100 / panel((struct counts){1, 1, 1}).Y);
+    assert_near(checked(COMMAND_WARNED), absolute, 1e-3); // by how far the fit misses white
+    unlink(ini);
+}
+
+static void help_names_what_the_commands_take(void **state)
+{
+    (void)state;
+    char *const names[] = {"fit", "check", "forward", "inverse"};
+    for (int i = 0; i < 4; i++) {
+        char *words[] = {"display", names[i], ini, "--help", NULL};
+        assert_int_equal(run(4, words), COMMAND_FINE);
+    }
+}
+
 // Runs forward or inverse on text as stdin; its stdout into out.
 static int lines(const char *what, const char *text, char *out, size_t size)
 {
@@ -387,12 +526,19 @@ int main(void)
         cmocka_unit_test(relative_values_become_absolute_through_the_luminance),
         cmocka_unit_test(without_luminance_the_white_patches_are_the_white),
         cmocka_unit_test(bad_files_are_refused_by_line_and_key),
+        cmocka_unit_test(another_unit_of_rgb_is_named_as_such),
+        cmocka_unit_test(the_white_rows_must_bear_the_luminance_out),
         cmocka_unit_test(a_day_model_is_found_again),
         cmocka_unit_test(noise_is_averaged_not_followed),
         cmocka_unit_test(a_panel_whose_channels_do_not_add_is_a_misfit),
+        cmocka_unit_test(exchanged_columns_show_in_the_primaries),
         cmocka_unit_test(too_few_patches_decide_nothing),
         cmocka_unit_test(real_panels_are_met_on_the_half_the_fit_never_saw),
         cmocka_unit_test(the_commands_fit_and_refuse_with_their_exit_codes),
+        cmocka_unit_test(the_measurements_are_not_overwritten),
+        cmocka_unit_test(a_white_that_is_a_little_wrong_is_a_warning),
+        cmocka_unit_test(relative_measurements_are_checked_at_their_own_white),
+        cmocka_unit_test(help_names_what_the_commands_take),
         cmocka_unit_test(forward_and_inverse_undo_each_other_line_by_line),
     };
     return cmocka_run_group_tests(tests, make_folder, drop_folder);

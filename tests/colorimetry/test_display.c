@@ -200,13 +200,29 @@ static void primaries_too_much_alike_are_refused(void **state)
     assert_false(display_model_prepare(&m, &err));
 }
 
+static void a_primary_that_takes_light_away_is_refused(void **state)
+{
+    (void)state;
+    struct display_model m = srgb();
+    struct error err = {0};
+    m.matrix[2][0] = -0.049 * m.matrix[1][0];
+    assert_true(display_model_prepare(&m, &err));
+    m.matrix[2][0] = -0.051 * m.matrix[1][0];
+    assert_false(display_model_prepare(&m, &err));
+    assert_non_null(strstr(err.text, "column 1: red"));
+    m = srgb();
+    m.matrix[1][2] = 0;
+    assert_false(display_model_prepare(&m, &err));
+    assert_non_null(strstr(err.text, "column 3: blue"));
+}
+
 static void the_condition_is_that_of_the_columns_as_they_are(void **state)
 {
     (void)state;
     struct display_model m = srgb();
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
-            m.matrix[i][j] = i == j ? 1 + 3 * (i == 2) : 0;
+            m.matrix[i][j] = i == j ? 1 + 3 * (i == 2) : i == 1 ? 1e-13 : 0; // every Y above 0
     assert_true(display_model_prepare(&m, NULL));
     assert_near(m.condition, 4, ARITHMETIC);
 }
@@ -271,6 +287,7 @@ int main(void)
         cmocka_unit_test(out_of_gamut_is_flagged_before_it_is_clipped),
         cmocka_unit_test(negative_and_absurd_targets_stay_finite_and_flagged),
         cmocka_unit_test(primaries_too_much_alike_are_refused),
+        cmocka_unit_test(a_primary_that_takes_light_away_is_refused),
         cmocka_unit_test(the_condition_is_that_of_the_columns_as_they_are),
         cmocka_unit_test(a_curve_that_does_not_rise_is_refused_by_name),
         cmocka_unit_test(repair_pools_violators_and_leaves_the_rest),

@@ -116,6 +116,17 @@ static void a_curve_that_falls_is_refused(void **state)
 {
     (void)state;
     refused("node_0500 = 0", "node_0500 = 0.9 0.9 0.9\n#", "does not rise");
+    char place[32];
+    FILE *in = fopen(path, "r");
+    char *line = NULL;
+    size_t room = 0;
+    int number = 1;
+    while (getline(&line, &room, in) > 0 && strncmp(line, "node_0501", 9))
+        number++;
+    fclose(in);
+    free(line);
+    snprintf(place, sizeof place, ":%d: [curves]", number);
+    refused("node_0500 = 0", "node_0500 = 0.9 0.9 0.9\n#", place);
 }
 
 static void a_missing_node_is_refused_by_name(void **state)
@@ -140,6 +151,7 @@ static void primaries_alike_are_refused(void **state)
     assert_true(display_save(path, &m, &origin, &err));
     assert_false(display_load(path, &m, NULL, &err));
     assert_non_null(strstr(err.text, "condition"));
+    assert_non_null(strstr(err.text, ": [matrix]: "));
 }
 
 int main(void)
