@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "calibration/bands_optimise.h"
 #include "calibration/commands.h"
@@ -132,6 +133,20 @@ static bool write_all(const struct task *task, const struct derived *d, struct e
                        : write_shapes(task->out, d, err);
 }
 
+// Before a minute of work.
+static bool can_write(const char *path, struct error *err)
+{
+    struct whole_file file;
+    struct stat s;
+    if (path && !stat(path, &s) && S_ISDIR(s.st_mode))
+        return fail(err, ERROR_CONFIG, "%s: is a directory", path);
+    if (path && !whole_file_begin(&file, path, err))
+        return false;
+    if (path)
+        whole_file_abandon(&file);
+    return true;
+}
+
 static bool parse_optimise(int argc, char **argv, struct task *task)
 {
     *task = (struct task){.data = DATA_FOLDER};
@@ -153,7 +168,8 @@ static bool parse_optimise(int argc, char **argv, struct task *task)
                      (task->count < BANDS_LEAST || task->count > BANDS_MOST)))
             return false;
     }
-    if (!task->out)
+    if (!task->out || (task->count && text_ends_with(task->out, ".c")) ||
+        (task->basis && !strcmp(task->basis, task->out)))
         return false;
     if (!task->count && !text_ends_with(task->out, ".c"))
         task->count = BANDS_SHIPPED;
@@ -166,13 +182,16 @@ static int command_optimise(int argc, char **argv)
     struct error err;
     if (!parse_optimise(argc, argv, &task))
         return command_bad_usage("usage: boothcal bands optimise [--count 3..16] [--data FOLDER] "
-                                 "[--basis BASIS.c] -o BANDS.ini|BANDS.c");
+                                 "[--basis BASIS.c] -o BANDS.ini|BANDS.c\n"
+                                 "(a .c holds all counts: without --count)");
     struct derived *d = calloc(1, sizeof *d);
     int code = COMMAND_FINE;
     if (!d) {
         fail(&err, ERROR_SYSTEM, "out of memory");
         code = command_failed(&err);
-    } else if (!derive(&task, d, &err))
+    } else if (!can_write(task.out, &err) || !can_write(task.basis, &err))
+        code = command_bad_input(&err);
+    else if (!derive(&task, d, &err))
         code = err.code == ERROR_CONFIG ? command_bad_input(&err) : command_failed(&err);
     else if (!write_all(&task, d, &err))
         code = command_failed(&err);
@@ -206,36 +225,54 @@ static bool check_lamp(const struct band_set *set, bool product, const struct sp
 }
 
 static bool check_set(const struct band_set *set, bool product, const struct spectra *chart,
-                      double *de00, struct error *err)
+                      double *de00, FILE *out, struct error *err)
 {
-    printf("%2d %-8s", set->count, product ? "product" : "adapted");
+    fprintf(out, "%2d %-8s", set->count, product ? "product" : "adapted");
     for (int n = 0; n < CHECK_LAMP_COUNT; n++) {
         struct spectrum lamp;
         if (!illuminant(CHECK_LAMPS[n], &lamp, err) ||
             !check_lamp(set, product, &lamp, chart, de00, err))
             return false;
         struct summary s = summarise(de00, chart->count);
-        printf(" %5.2f/%5.2f", s.mean, s.max);
+        fprintf(out, " %5.2f/%5.2f", s.mean, s.max);
     }
-    putchar('\n');
+    fputc('\n', out);
     return true;
 }
 
-static bool check_named(int argc, char **argv, const struct spectra *chart, double *de00,
+static bool check_named(int argc, char **argv, const struct spectra *chart, double *de00, FILE *out,
                         struct error *err)
 {
     static char *usual[] = {"6", "3", "4", "8", "12", "16", NULL};
     char **names = argc > 2 ? argv + 2 : usual;
     struct band_set set;
-    printf("CIEDE2000 mean/max of %d spectra against 1 nm\n           ", chart->count);
+    fprintf(out, "CIEDE2000 mean/max of %d spectra against 1 nm\n           ", chart->count);
     for (int n = 0; n < CHECK_LAMP_COUNT; n++)
-        printf(" %11s", CHECK_LAMPS[n]);
-    putchar('\n');
+        fprintf(out, " %11s", CHECK_LAMPS[n]);
+    fputc('\n', out);
     for (int i = 0; names[i]; i++)
-        if (!bands_named(names[i], &set, err) || !check_set(&set, false, chart, de00, err) ||
-            (set.count == BANDS_SHIPPED && !check_set(&set, true, chart, de00, err)))
+        if (!bands_named(names[i], &set, err) || !check_set(&set, false, chart, de00, out, err) ||
+            (set.count == BANDS_SHIPPED && !check_set(&set, true, chart, de00, out, err)))
             return false;
     return true;
+}
+
+// Nothing is printed before the last set was checked.
+static bool print_check(int argc, char **argv, const struct spectra *chart, struct error *err)
+{
+    char *text = NULL;
+    size_t size = 0;
+    double *de00 = malloc((size_t)chart->count * sizeof *de00);
+    FILE *out = open_memstream(&text, &size);
+    bool ok = (de00 && out) || fail(err, ERROR_SYSTEM, "out of memory");
+    ok = ok && check_named(argc, argv, chart, de00, out, err);
+    if (out && fclose(out) && ok)
+        ok = fail_errno(err, "no memory for the answer");
+    if (ok)
+        fwrite(text, 1, size, stdout);
+    free(text);
+    free(de00);
+    return ok;
 }
 
 static int command_bands_check(int argc, char **argv)
@@ -246,12 +283,10 @@ static int command_bands_check(int argc, char **argv)
         return command_bad_usage("usage: boothcal bands check CHART.csv [COUNT|BANDS.ini]...");
     if (!spectra_load(argv[1], true, &chart, &err))
         return command_bad_input(&err);
-    double *de00 = malloc((size_t)chart.count * sizeof *de00);
-    bool ok = de00 ? check_named(argc, argv, &chart, de00, &err)
-                   : fail(&err, ERROR_SYSTEM, "out of memory");
-    free(de00);
+    bool ok = print_check(argc, argv, &chart, &err);
+    int code = ok ? command_warned(chart.warning) : command_bad_input(&err);
     spectra_fini(&chart);
-    return ok ? COMMAND_FINE : command_bad_input(&err);
+    return code;
 }
 
 int command_bands(int argc, char **argv)
@@ -259,14 +294,23 @@ int command_bands(int argc, char **argv)
     static const struct command TABLE[] = {
         {"optimise", command_optimise,
          "[--count 3..16] [--data FOLDER] [--basis BASIS.c] -o BANDS.ini|BANDS.c",
-         "Derives the reflectance basis and the band shapes again from FOLDER's sur_nickerson,\n"
-         "      sur_vrhel, sur_krinov and sur_koivisto .mat (default: Debian's\n"
-         "      psychtoolbox-3-common). To BANDS.ini: one set (default 6 bands) for --bands\n"
-         "      and [quality] bands. To BANDS.c and BASIS.c: all counts, as they stand in\n"
-         "      colorimetry/tables/bands.c and reflectance_basis.c (a minute; the same numbers\n"
-         "      every time)."},
+         "Derives the reflectance basis and the band shapes again (a minute; the same numbers\n"
+         "      every time).\n"
+         "\n"
+         "  --count 3..16    bands of the set (default: 6); not with BANDS.c\n"
+         "  --data FOLDER    of sur_nickerson, sur_vrhel, sur_krinov and sur_koivisto .mat\n"
+         "                   (default: Debian's psychtoolbox-3-common)\n"
+         "  --basis BASIS.c  also the basis, as in colorimetry/tables/reflectance_basis.c\n"
+         "  -o BANDS.ini     one set, for --bands and [quality] bands\n"
+         "  -o BANDS.c       all counts, as in colorimetry/tables/bands.c\n"
+         "  --help"},
         {"check", command_bands_check, "CHART.csv [COUNT|BANDS.ini]...",
-         "Prints how far band coefficients are from full spectra, lamp by lamp."},
+         "Prints how far band coefficients are from full spectra, lamp by lamp.\n"
+         "\n"
+         "  CHART.csv   reflectances, 0..1: nm, v1, v2, ... (or CGATS .sp)\n"
+         "  COUNT       a shipped set, 3..16 bands (default: 6 3 4 8 12 16)\n"
+         "  BANDS.ini   a set of your own\n"
+         "  --help"},
         {NULL, NULL, NULL, NULL},
     };
     return command_run("boothcal bands", TABLE, argc, argv);

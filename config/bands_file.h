@@ -6,7 +6,8 @@
 
 #include "colorimetry/bands.h"
 
-// Errors name file, key, value and what is allowed.
+// Errors name file, key, value and what is allowed; bands all but identical are
+// refused.
 bool bands_load(const char *path, struct band_set *out, struct error *err);
 bool bands_save(const char *path, const struct band_set *set, struct error *err);
 

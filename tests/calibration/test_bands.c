@@ -148,6 +148,44 @@ static void the_command_checks_a_chart(void **state)
     assert_int_equal(command_bands(3, bad), COMMAND_USAGE);
 }
 
+static void what_cannot_be_written_is_refused_before_the_work(void **state)
+{
+    (void)state;
+    char *both[] = {"bands", "optimise", "--count", "6", "-o", "/tmp/x.c", NULL};
+    char *nowhere[] = {"bands", "optimise", "-o", "/nowhere/x.ini", NULL};
+    char *folder[] = {"bands", "optimise", "-o", "/tmp", NULL};
+    char *basis[] = {"bands", "optimise", "--basis", "/nowhere/b.c", "-o", "/tmp/boothd-none.ini",
+                     NULL};
+    assert_int_equal(command_bands(6, both), COMMAND_USAGE);
+    assert_int_equal(command_bands(4, nowhere), COMMAND_USAGE);
+    assert_int_equal(command_bands(4, folder), COMMAND_USAGE);
+    assert_int_equal(command_bands(6, basis), COMMAND_USAGE);
+    assert_int_equal(access("/tmp/boothd-none.ini", F_OK), -1);
+}
+
+static void a_check_that_fails_prints_nothing(void **state)
+{
+    (void)state;
+    char *bad[] = {"bands", "check",        "config/materials/colorchecker24.csv",
+                   "6",     "/nowhere.ini", NULL};
+    char *help[] = {"bands", "check", "--help", NULL};
+    FILE *seen = tmpfile();
+    fflush(stdout);
+    int kept = dup(1);
+    dup2(fileno(seen), 1);
+    int code = command_bands(5, bad);
+    fflush(stdout);
+    long printed = lseek(fileno(seen), 0, SEEK_END);
+    int helped = command_bands(3, help);
+    fflush(stdout);
+    dup2(kept, 1);
+    close(kept);
+    fclose(seen);
+    assert_int_equal(code, COMMAND_USAGE);
+    assert_int_equal(printed, 0);
+    assert_int_equal(helped, COMMAND_FINE);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -157,6 +195,8 @@ int main(void)
         cmocka_unit_test(more_bands_leave_less),
         cmocka_unit_test(the_command_writes_a_set_that_loads),
         cmocka_unit_test(the_command_checks_a_chart),
+        cmocka_unit_test(what_cannot_be_written_is_refused_before_the_work),
+        cmocka_unit_test(a_check_that_fails_prints_nothing),
         cmocka_unit_test(missing_data_is_named),
     };
     return cmocka_run_group_tests(tests, load, unload);

@@ -88,6 +88,8 @@ static void files_that_contradict_themselves_are_refused(void **state)
         {"[bands]\ncount = 2\ncentre_nm = 450 550\nwidth_nm = 30 30\n", "3..16"},
         {"[bands]\ncount = 3\ncentre_nm = 450 550 620\n", "width_nm"},
         {"[bands]\ncount = 3\ncentre_nm = 450 550 620\nwidth_nm = 3 3 3\ncolour = 1\n", "colour"},
+        {"[bands]\ncount = 3\ncentre_nm = 450 550 450.3\nwidth_nm = 30 30 30\n",
+         "bands 1 and 3 (450 and 450.3 nm"},
         {"", "bands.ini"},
     };
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
