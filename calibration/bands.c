@@ -192,7 +192,7 @@ static int command_optimise(int argc, char **argv)
     } else if (!can_write(task.out, &err) || !can_write(task.basis, &err))
         code = command_bad_input(&err);
     else if (!derive(&task, d, &err))
-        code = err.code == ERROR_CONFIG ? command_bad_input(&err) : command_failed(&err);
+        code = command_failed(&err);
     else if (!write_all(&task, d, &err))
         code = command_failed(&err);
     free(d);

@@ -73,7 +73,7 @@ int command_bad_input(const struct error *err)
 int command_failed(const struct error *err)
 {
     fprintf(stderr, "boothcal: %s\n", err->text);
-    return COMMAND_FAILED;
+    return error_exit_code(err);
 }
 
 int command_warned(const char *warning)

@@ -28,7 +28,8 @@ struct command {
 // colour".
 int command_run(const char *family, const struct command *table, int argc, char **argv);
 
-// Each prints one line on stderr and returns the exit code of its name.
+// Each prints one line on stderr and returns the exit code: the first two
+// COMMAND_USAGE, command_failed what the error's code says (base/error.h).
 int command_bad_usage(const char *format, ...) __attribute__((format(printf, 1, 2)));
 int command_bad_input(const struct error *err);
 int command_failed(const struct error *err);

@@ -228,5 +228,5 @@ int command_session(int argc, char **argv)
     free(facts);
     if (fine)
         return all_reached ? COMMAND_FINE : COMMAND_WARNED;
-    return err.code == ERROR_CONFIG ? COMMAND_USAGE : COMMAND_FAILED;
+    return error_exit_code(&err);
 }

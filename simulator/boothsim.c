@@ -318,7 +318,7 @@ static int run(const struct options *options)
 {
     struct booth *b = calloc(1, sizeof *b);
     struct error err = {0};
-    int status = EXIT_USAGE;
+    int status = EXIT_FAILURE;
     if (!b)
         return EXIT_FAILURE;
     b->options = options;
@@ -326,14 +326,13 @@ static int run(const struct options *options)
                 (b->world = world_create(&b->scenario, clock_now_ns(), &err)) &&
                 load_script(b, &err);
     if (good) {
-        status = EXIT_FAILURE;
         catch_signals();
         good = bring_up(b, &err) && live(b, &status, &err);
-        if (!good && err.code == ERROR_CONFIG)
-            status = EXIT_USAGE;
     }
-    if (!good)
+    if (!good) {
         log_line(LOG_LEVEL_ERROR, "%s", err.text);
+        status = error_exit_code(&err);
+    }
     take_down(b);
     free(b);
     return status;
