@@ -497,6 +497,45 @@ static void reload_takes_a_new_display_and_refuses_a_broken_one(void **state)
     end();
 }
 
+static void put_bands_material(void)
+{
+    struct exr image;
+    assert_true(exr_init(&image, 1, 1, 6, NULL));
+    for (int i = 0; i < 6; i++) {
+        snprintf(image.names[i], sizeof image.names[i], "band%d", i);
+        image.pixels[i] = 0.5f;
+    }
+    assert_true(exr_save(folder_at(&here, "grey.exr"), &image, NULL));
+    exr_fini(&image);
+    folder_put(&here, "grey.ini", "[material]\nname = grey\nkind = bands\nsource = grey.exr\n");
+}
+
+static void a_reload_whose_first_frame_fails_changes_nothing(void **state)
+{
+    (void)state;
+    put_bands_material();
+    begin(FLAT);
+    json_decref(ask(json_pack("{ss,ss}", "do", "show", "material", folder_at(&here, "grey.ini"))));
+    char full[4096];
+    const char *plain = settings_text(FLAT "[state]\nlevel_s = 3\n");
+    const char *lights = strstr(plain, "lights = ");
+    snprintf(full, sizeof full, "%.*sspectral = full\n%s", (int)(lights - plain), plain, lights);
+    folder_put(&here, "b.conf", full);
+    refused(json_pack("{ss}", "do", "reload"), ERROR_CONFIG, "no spectra");
+    for (int i = 0; i < 2; i++) {
+        json_t *status = ask(json_pack("{ss}", "do", "status"));
+        assert_string_equal(text(status, "scene"), "surface");
+        assert_true(json_is_null(json_object_get(status, "failure")));
+        const json_t *settings = json_object_get(status, "settings");
+        assert_string_equal(text(json_object_get(settings, "quality"), "spectral"), "auto");
+        assert_string_equal(text(json_object_get(settings, "state"), "level_s"), "2");
+        json_decref(status);
+        folder_put(&here, "b.conf", settings_text(FLAT));
+        json_decref(ask(json_pack("{ss}", "do", "reload"))); // and the next one works
+    }
+    end();
+}
+
 static void reload_names_what_counts_after_a_restart_only(void **state)
 {
     (void)state;
@@ -627,6 +666,7 @@ int main(void)
         FULL(a_patch_of_the_chart_fills_the_screen_and_the_chart_does_not),
         FULL(an_idle_booth_draws_nothing),
         FULL(reload_takes_a_new_display_and_refuses_a_broken_one),
+        FULL(a_reload_whose_first_frame_fails_changes_nothing),
         FULL(reload_names_what_counts_after_a_restart_only),
         FULL(hang_up_signal_reloads),
         FULL(boothctl_speaks_to_people_and_to_programs),
