@@ -254,13 +254,15 @@ static bool solve(struct fit *f, struct display_model *model, struct display_fit
         .iterations = 500,
     };
     start_at(f, x);
-    if (!aim(f, err) || !least_squares_solve(&problem, x, &result, err))
+    if (!aim(f, err))
         return while_doing(err, "%s", f->m->path);
-    found->iterations = result.iterations;
-    found->pooled = build(f, x, model);
-    if (!display_model_prepare(model, err))
-        return while_doing(err, "%s", f->m->path);
-    return true;
+    bool solved = least_squares_solve(&problem, x, &result, err);
+    if (solved) {
+        found->iterations = result.iterations;
+        found->pooled = build(f, x, model);
+    }
+    return (solved && display_model_prepare(model, err)) ||
+           while_doing(err, "%s: RGB and XYZ of the patches belong to no display", f->m->path);
 }
 
 // ---- what to say about it --------------------------------------------------

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/number.h"
 #include "files/ini.h"
 
 // Cosine between two bands' sensitivities; half a nanometre apart at a width of
@@ -39,9 +40,8 @@ static bool numbers(const char *path, const char *key, const char *text, int cou
 {
     const char *at = text;
     for (int i = 0; i < count; i++) {
-        char *end;
-        values[i] = strtod(at, &end);
-        if (end == at || !isfinite(values[i]) || (*end && *end != ' ' && *end != '\t'))
+        const char *end = at += strspn(at, " \t");
+        if (!number_parse(at, &end, &values[i]) || (*end && *end != ' ' && *end != '\t'))
             return fail(err, ERROR_CONFIG, "%s: [bands] %s = %.80s: it must be %d numbers (count)",
                         path, key, text, count);
         at = end;

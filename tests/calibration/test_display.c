@@ -314,6 +314,24 @@ static void exchanged_columns_show_in_the_primaries(void **state)
     }
 }
 
+static void values_of_other_patches_are_no_display(void **state)
+{
+    (void)state;
+    struct measurements m = measured(0);
+    struct display_model model;
+    struct display_fit found;
+    struct error err = {0};
+    for (int i = m.count - 1; i > 0; i--) {
+        int j = (int)(uniform() * (i + 1));
+        struct xyz swap = m.patches[i].xyz;
+        m.patches[i].xyz = m.patches[j].xyz;
+        m.patches[j].xyz = swap;
+    }
+    assert_false(display_fit(&m, &model, &found, &err));
+    assert_non_null(strstr(err.text, "belong to no display"));
+    measurements_fini(&m);
+}
+
 static void too_few_patches_decide_nothing(void **state)
 {
     (void)state;
@@ -532,6 +550,7 @@ int main(void)
         cmocka_unit_test(noise_is_averaged_not_followed),
         cmocka_unit_test(a_panel_whose_channels_do_not_add_is_a_misfit),
         cmocka_unit_test(exchanged_columns_show_in_the_primaries),
+        cmocka_unit_test(values_of_other_patches_are_no_display),
         cmocka_unit_test(too_few_patches_decide_nothing),
         cmocka_unit_test(real_panels_are_met_on_the_half_the_fit_never_saw),
         cmocka_unit_test(the_commands_fit_and_refuse_with_their_exit_codes),

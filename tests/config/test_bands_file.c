@@ -82,6 +82,7 @@ static void files_that_contradict_themselves_are_refused(void **state)
         {"[bands]\ncount = 3\ncentre_nm = 450 550\nwidth_nm = 30 30 30\n", "centre_nm"},
         {"[bands]\ncount = 3\ncentre_nm = 450 550 620 700\nwidth_nm = 30 30 30\n", "centre_nm"},
         {"[bands]\ncount = 3\ncentre_nm = 450 550 x\nwidth_nm = 30 30 30\n", "centre_nm"},
+        {"[bands]\ncount = 3\ncentre_nm = 450 550 0x26c\nwidth_nm = 30 30 30\n", "centre_nm"},
         {"[bands]\ncount = 3\ncentre_nm = 450 550 nan\nwidth_nm = 30 30 30\n", "centre_nm"},
         {"[bands]\ncount = 3\ncentre_nm = 450,550,620\nwidth_nm = 30 30 30\n", "centre_nm"},
         {"[bands]\ncount = 3\ncentre_nm = 450 550 620\nwidth_nm = 30 0 30\n", "0"},
