@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "base/control.h"
-
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
@@ -9,15 +7,13 @@
 #include <sys/file.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "base/control.h"
+#include "base/control_wire.h"
 
 enum {
-    LINE_MOST = 1 << 20,
-    REPLY_MOST = 1 << 26,
-    CHUNK = 1 << 16,
     CLIENTS_MOST = 16,
     LOCK_TRIES = 8,
     REST_MS = 100,
@@ -25,45 +21,6 @@ enum {
 };
 
 static const int64_t IDLE_NS = 10 * NS_PER_S;
-
-// Bytes waiting to be parsed or sent.
-struct bytes {
-    char *text;
-    size_t used, room;
-};
-
-static bool bytes_reserve(struct bytes *b, size_t more)
-{
-    if (b->used + more <= b->room)
-        return true;
-    size_t room = 2 * b->room > b->used + more ? 2 * b->room : b->used + more;
-    char *text = realloc(b->text, room);
-    if (!text)
-        return false;
-    b->text = text;
-    b->room = room;
-    return true;
-}
-
-static void bytes_drop(struct bytes *b, size_t count)
-{
-    memmove(b->text, b->text + count, b->used - count);
-    b->used -= count;
-    if (b->used || b->room <= CHUNK)
-        return;
-    free(b->text);
-    *b = (struct bytes){0};
-}
-
-static bool address_of(const char *path, struct sockaddr_un *address, struct error *err)
-{
-    *address = (struct sockaddr_un){.sun_family = AF_UNIX};
-    if (!*path || strlen(path) >= sizeof address->sun_path)
-        return fail(err, ERROR_RANGE, "%s: a socket path must have 1..%zu bytes", path,
-                    sizeof address->sun_path - 1);
-    strcpy(address->sun_path, path);
-    return true;
-}
 
 // Error texts may quote a peer's bytes; JSON takes UTF-8 only.
 static json_t *json_text(const char *text)
@@ -79,195 +36,7 @@ static json_t *json_text(const char *text)
     return json_string(plain);
 }
 
-// The client's side.
-
-struct control_client {
-    int fd;
-    bool broken;     // half a request went out
-    unsigned unread; // replies to calls that timed out, still to come
-    struct bytes in;
-    char path[sizeof((struct sockaddr_un *)0)->sun_path];
-};
-
-// connect() waits while the server's queue is full; this bounds it.
-static const struct timeval CONNECT_PATIENCE = {.tv_sec = 5};
-
-static bool open_client(struct control_client *client, const struct sockaddr_un *address,
-                        struct error *err)
-{
-    client->fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    if (client->fd < 0)
-        return fail_errno(err, "%s: no socket", client->path);
-    setsockopt(client->fd, SOL_SOCKET, SO_SNDTIMEO, &CONNECT_PATIENCE, sizeof CONNECT_PATIENCE);
-    if (!connect(client->fd, (const struct sockaddr *)address, sizeof *address))
-        return true;
-    if (errno == ENOENT || errno == ECONNREFUSED)
-        return fail(err, ERROR_GONE, "%s: nobody listens there", client->path);
-    if (errno == EAGAIN)
-        return fail(err, ERROR_RETRY, "%s: too many callers", client->path);
-    return fail_errno(err, "%s: cannot connect", client->path);
-}
-
-struct control_client *control_connect(const char *path, struct error *err)
-{
-    struct sockaddr_un address;
-    if (!address_of(path, &address, err))
-        return NULL;
-    struct control_client *client = calloc(1, sizeof *client);
-    if (!client) {
-        fail_errno(err, "%s", path);
-        return NULL;
-    }
-    strcpy(client->path, path);
-    if (open_client(client, &address, err))
-        return client;
-    control_close(client);
-    return NULL;
-}
-
-void control_close(struct control_client *client)
-{
-    if (!client)
-        return;
-    if (client->fd >= 0)
-        close(client->fd);
-    free(client->in.text);
-    free(client);
-}
-
-static bool wait_for(struct control_client *client, short events, int64_t deadline_ns,
-                     struct error *err)
-{
-    for (;;) {
-        int64_t left_ns = deadline_ns - clock_now_ns();
-        struct pollfd p = {client->fd, events, 0};
-        int ready = poll(&p, 1, left_ns > 0 ? (int)(left_ns / NS_PER_MS) + 1 : 0);
-        if (ready > 0)
-            return true;
-        if (!ready)
-            return fail(err, ERROR_RETRY, "%s: no answer in time", client->path);
-        if (errno != EINTR)
-            return fail_errno(err, "%s: cannot wait", client->path);
-    }
-}
-
-static bool send_line(struct control_client *client, const char *line, size_t size,
-                      int64_t deadline_ns, struct error *err)
-{
-    for (size_t sent = 0; sent < size;) {
-        ssize_t n = send(client->fd, line + sent, size - sent, MSG_NOSIGNAL | MSG_DONTWAIT);
-        if (n > 0) {
-            sent += n;
-        } else if (errno == EAGAIN || errno == EWOULDBLOCK) {
-            if (wait_for(client, POLLOUT, deadline_ns, err))
-                continue;
-            client->broken = sent;
-            return false;
-        } else if (errno != EINTR) {
-            client->broken = true; // but its last words may be there to read
-            return true;
-        }
-    }
-    return true;
-}
-
-static bool receive(struct control_client *client, struct error *err)
-{
-    if (client->in.used > REPLY_MOST || !bytes_reserve(&client->in, CHUNK)) {
-        client->broken = true;
-        return fail(err, ERROR_DATA, "%s: an answer is longer than %d bytes", client->path,
-                    REPLY_MOST);
-    }
-    ssize_t n = recv(client->fd, client->in.text + client->in.used, CHUNK, MSG_DONTWAIT);
-    if (n > 0)
-        client->in.used += n;
-    else if (!n || (errno != EAGAIN && errno != EINTR))
-        return fail(err, ERROR_GONE, "%s: the connection was closed", client->path);
-    return true;
-}
-
-// Waits until a whole line is in; *size without its end.
-static bool receive_line(struct control_client *client, size_t *size, int64_t deadline_ns,
-                         struct error *err)
-{
-    size_t looked = 0;
-    for (;;) {
-        char *end = looked < client->in.used
-                        ? memchr(client->in.text + looked, '\n', client->in.used - looked)
-                        : NULL;
-        if (end) {
-            *size = end - client->in.text;
-            return true;
-        }
-        looked = client->in.used;
-        if (!wait_for(client, POLLIN, deadline_ns, err) || !receive(client, err))
-            return false;
-    }
-}
-
-static enum error_code code_of(const char *name)
-{
-#define X(code, text)                                                                              \
-    if (name && !strcmp(name, text))                                                               \
-        return ERROR_##code;
-    ERROR_CODES(X)
-#undef X
-    return ERROR_DATA;
-}
-
-static json_t *take_reply(struct control_client *client, size_t size, struct error *err)
-{
-    json_t *reply = json_loadb(client->in.text, size, 0, NULL);
-    bytes_drop(&client->in, size + 1);
-    json_t *ok = json_object_get(reply, "ok");
-    if (json_is_true(ok))
-        return reply;
-    const char *text = json_string_value(json_object_get(reply, "error"));
-    if (json_is_false(ok) && text)
-        fail(err, code_of(json_string_value(json_object_get(reply, "code"))), "%s", text);
-    else
-        fail(err, ERROR_DATA, "%s: the answer is not a reply", client->path);
-    json_decref(reply);
-    return NULL;
-}
-
-static bool send_request(struct control_client *client, json_t *request, int64_t deadline_ns,
-                         struct error *err)
-{
-    char *text = request ? json_dumps(request, JSON_COMPACT) : NULL;
-    json_decref(request);
-    if (!text)
-        return fail(err, ERROR_RANGE, "%s: the request is not valid JSON", client->path);
-    size_t size = strlen(text);
-    text[size] = '\n';
-    bool ok = send_line(client, text, size + 1, deadline_ns, err);
-    free(text);
-    return ok;
-}
-
-json_t *control_call(struct control_client *client, json_t *request, int timeout_ms,
-                     struct error *err)
-{
-    int64_t deadline_ns = clock_now_ns() + timeout_ms * NS_PER_MS;
-    if (client->broken) {
-        json_decref(request);
-        fail(err, ERROR_GONE, "%s: the connection was lost", client->path);
-        return NULL;
-    }
-    if (!send_request(client, request, deadline_ns, err))
-        return NULL;
-    client->unread++;
-    for (;;) {
-        size_t size;
-        if (!receive_line(client, &size, deadline_ns, err))
-            return NULL;
-        if (!--client->unread)
-            return take_reply(client, size, err);
-        bytes_drop(&client->in, size + 1);
-    }
-}
-
-// The server's side. At most one reply waits per client; while it does, the
+// At most one reply waits per client; while it does, the
 // client's further lines wait too, so that one who never reads costs nothing.
 
 struct caller {
@@ -276,7 +45,7 @@ struct caller {
     bool answered;    // late: lines that came meanwhile are to be looked at
     uint64_t awaited; // ticket of the answer to come, 0 = none
     int64_t moved_ns; // when it last came, asked or was answered
-    struct bytes in, out;
+    struct control_bytes in, out;
 };
 
 struct control_server {
@@ -380,7 +149,7 @@ static bool open_server(struct control_server *server, struct error *err)
 struct control_server *control_listen(const char *path, struct error *err)
 {
     struct sockaddr_un address;
-    if (!address_of(path, &address, err))
+    if (!control_address(path, &address, err))
         return NULL;
     struct control_server *server = calloc(1, sizeof *server);
     if (!server) {
@@ -443,7 +212,7 @@ static bool queue_reply(struct caller *caller, json_t *reply)
     char *text = reply ? json_dumps(reply, JSON_COMPACT) : NULL;
     json_decref(reply);
     size_t size = text ? strlen(text) : 0;
-    bool ok = text && bytes_reserve(&caller->out, size + 1);
+    bool ok = text && control_bytes_reserve(&caller->out, size + 1);
     if (ok) {
         memcpy(caller->out.text + caller->out.used, text, size);
         caller->out.text[caller->out.used + size] = '\n';
@@ -469,7 +238,7 @@ static bool flush(struct caller *caller)
             ok = errno == EINTR;
     }
     if (sent) {
-        bytes_drop(&caller->out, sent);
+        control_bytes_drop(&caller->out, sent);
         caller->moved_ns = clock_now_ns();
     }
     return ok;
@@ -477,9 +246,9 @@ static bool flush(struct caller *caller)
 
 static bool read_more(struct caller *caller)
 {
-    if (!bytes_reserve(&caller->in, CHUNK))
+    if (!control_bytes_reserve(&caller->in, CONTROL_CHUNK))
         return false;
-    ssize_t n = recv(caller->fd, caller->in.text + caller->in.used, CHUNK, MSG_DONTWAIT);
+    ssize_t n = recv(caller->fd, caller->in.text + caller->in.used, CONTROL_CHUNK, MSG_DONTWAIT);
     if (n > 0) {
         caller->in.used += n;
         caller->moved_ns = clock_now_ns();
@@ -498,7 +267,7 @@ static bool answer_lines(struct control_server *server, struct caller *caller,
         char *line = caller->in.text + done;
         char *end = memchr(line, '\n', caller->in.used - done);
         size_t size = end ? (size_t)(end - line) : caller->in.used - done;
-        if (size > LINE_MOST)
+        if (size > CONTROL_LINE_MOST)
             ok = false;
         if (!end || !ok)
             break;
@@ -513,7 +282,7 @@ static bool answer_lines(struct control_server *server, struct caller *caller,
         caller->answered = false;
     }
     if (done)
-        bytes_drop(&caller->in, done);
+        control_bytes_drop(&caller->in, done);
     return ok && !(caller->ended && !caller->out.used && !caller->awaited);
 }
 
@@ -614,7 +383,7 @@ static void serve_caller(struct control_server *server, struct caller *caller, s
     caller->answered = false;
     if (ok && !caller->out.used && !caller->awaited && events & (POLLIN | POLLHUP))
         ok = read_more(caller);
-    while (ok && events & POLLHUP && !caller->ended && caller->in.used <= LINE_MOST)
+    while (ok && events & POLLHUP && !caller->ended && caller->in.used <= CONTROL_LINE_MOST)
         ok = read_more(caller);
     if (!ok || !answer_lines(server, caller, handle, context))
         hang_up(caller);
