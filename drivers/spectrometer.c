@@ -2,6 +2,7 @@
 #include "drivers/spectrometer.h"
 
 #include "drivers/ocean.h"
+#include "drivers/replay.h"
 
 #define FIELD(name) SETTING_FIELD(struct spectrometer_options, name)
 #define SIZE(name) SETTING_SIZE(struct spectrometer_options, name)
@@ -17,6 +18,8 @@ const char *spectrometer_status_name(enum spectrometer_status status)
     }
     return "unknown";
 }
+
+static const char *const unit_names[] = {"uW/cm2/nm", "mW/m2/nm", "W/m2/nm", NULL};
 
 const struct setting spectrometer_settings[] = {
     {"serial", SETTING_TEXT, FIELD(serial), SIZE(serial), .unit = "", .preset = "",
@@ -34,7 +37,12 @@ const struct setting spectrometer_settings[] = {
      .help = "Longest exposure chosen by itself: in the dark a reading takes three of them."},
     {"average", SETTING_INT, FIELD(average), .least = 1, .most = 100, .unit = "", .preset = "1",
      .help = "Readings averaged into one sample."},
+    {"file", SETTING_TEXT, FIELD(file), SIZE(file), .unit = "", .preset = "",
+     .help = "Driver replay: file of OceanView, SpectraSuite, Jaz, a .sp or \"nm, value\"."},
+    {"file_unit", SETTING_ENUM, FIELD(file_unit), .unit = "", .choices = unit_names,
+     .preset = "uW/cm2/nm", .help = "Driver replay: unit of the file's values."},
     {0},
 };
 
-const struct spectrometer_driver *const spectrometer_drivers[] = {&ocean_driver, NULL};
+const struct spectrometer_driver *const spectrometer_drivers[] = {&ocean_driver, &replay_driver,
+                                                                  NULL};

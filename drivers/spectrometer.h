@@ -22,19 +22,24 @@ enum spectrometer_status {
 const char *spectrometer_status_name(enum spectrometer_status status);
 
 struct spectrum_sample {
-    struct interval taken;      // the light fell on the detector within this interval
+    struct interval taken; // the light fell on the detector within this interval
     enum spectrometer_status status;
-    int integration_us;         // of this reading
-    int averaged;               // readings averaged, >= 1
-    double peak;                // largest raw count over saturation, 0..1
-    struct spectrum irradiance; // W m-2 nm-1 on the inner grid; 0 where the instrument does not reach
-    struct spectrum sigma;      // standard uncertainty of it (shot, read, dark), same unit
+    int integration_us; // of this reading
+    int averaged;       // readings averaged, >= 1
+    double peak;        // largest raw count over saturation, 0..1
+    struct spectrum
+        irradiance;        // W m-2 nm-1 on the inner grid; 0 where the instrument does not reach
+    struct spectrum sigma; // standard uncertainty of it (shot, read, dark), same unit; all 0
+                           // where none is known (replay)
 };
 
 struct instrument_identity {
     char model[64], serial[64], firmware[64];
     bool emulated; // the instrument says of itself that it is emulated
 };
+
+// What the values of a replayed file are: the files do not tell.
+enum file_unit { FILE_UW_CM2, FILE_MW_M2, FILE_W_M2 };
 
 struct spectrometer_options {
     char serial[64];       // "" = the first one found
@@ -44,6 +49,8 @@ struct spectrometer_options {
     int integration_us;    // first exposure, 1000..65535000
     int longest_us;        // longest exposure it chooses itself, 1000..65535000
     int average;           // readings per sample, 1..100
+    char file[512];        // replay: the file
+    int file_unit;         // replay: an enum file_unit
 };
 
 extern const struct setting spectrometer_settings[];
