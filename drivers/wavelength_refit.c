@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "drivers/wavelength_refit.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { PEAKS_MOST = 256, HALF_WIDTH = 3, NEIGHBOURS = 12, SHIFT_STEPS = 50, ORDER = 4 };
+
+static const double shift_most_nm = 5, window_nm = 1, other_shift_nm = 2;
+static const double least_part = 0.01, noise_times = 10;
+static const double least_span_nm = 200, most_left_nm = 0.5;
+
+const double refit_mercury_argon[] = {253.652, 296.728, 302.150, 313.155, 334.148, 365.015,
+                                      404.656, 407.783, 435.833, 546.074, 576.960, 579.066,
+                                      696.543, 706.722, 738.398, 763.511, 772.376, 794.818,
+                                      826.452, 842.465, 852.144, 866.794, 912.297, 0};
+
+static double at(const double c[ORDER], double x)
+{
+    return c[0] + x * (c[1] + x * (c[2] + x * c[3]));
+}
+
+// Median step between neighbours about a pixel but off its peak: noise, even
+// where other lines stand near.
+static double noise_about(const double *counts, int pixels, int peak)
+{
+    double steps[2 * (HALF_WIDTH + NEIGHBOURS)];
+    int count = 0;
+    for (int i = peak - HALF_WIDTH - NEIGHBOURS; i < peak + HALF_WIDTH + NEIGHBOURS; i++) {
+        if (i < 1 || i >= pixels - 1 || (i > peak - 2 * HALF_WIDTH && i < peak + 2 * HALF_WIDTH))
+            continue;
+        double step = fabs(counts[i] - (counts[i - 1] + counts[i + 1]) / 2);
+        int at_step = count++;
+        for (; at_step > 0 && steps[at_step - 1] > step; at_step--)
+            steps[at_step] = steps[at_step - 1];
+        steps[at_step] = step;
+    }
+    return count ? steps[count / 2] : INFINITY;
+}
+
+static bool is_peak(const double *counts, int pixels, int i)
+{
+    for (int d = 1; d <= HALF_WIDTH; d++)
+        if (!(counts[i] > counts[i - d]) || !(counts[i] >= counts[i + d]))
+            return false;
+    double foot = (counts[i - HALF_WIDTH] + counts[i + HALF_WIDTH]) / 2;
+    return counts[i] - foot > noise_times * noise_about(counts, pixels, i);
+}
+
+// Vertex of the parabola through the logarithms: exact for a Gaussian line.
+static double vertex(const double *counts, int i)
+{
+    double a = log(fmax(counts[i - 1], 1e-9)), b = log(counts[i]);
+    double c = log(fmax(counts[i + 1], 1e-9)), bend = a - 2 * b + c;
+    double off = bend < 0 ? (a - c) / (2 * bend) : 0;
+    return i + fmin(fmax(off, -0.5), 0.5);
+}
+
+static int find_peaks(const double *counts, int pixels, double peaks[PEAKS_MOST])
+{
+    double most = 0;
+    int count = 0;
+    for (int i = 0; i < pixels; i++)
+        most = fmax(most, counts[i]);
+    for (int i = HALF_WIDTH; i < pixels - HALF_WIDTH && count < PEAKS_MOST; i++)
+        if (counts[i] > least_part * most && is_peak(counts, pixels, i))
+            peaks[count++] = vertex(counts, i);
+    return count;
+}
+
+struct matches {
+    double pixel[REFIT_LINES_MOST], nm[REFIT_LINES_MOST];
+    int count;
+    double off; // sum of squares
+};
+
+static void match(const double old[ORDER], double shift, const double *peaks, int peak_count,
+                  const double *lines, struct matches *out)
+{
+    *out = (struct matches){0};
+    for (int l = 0; lines[l] > 0 && out->count < REFIT_LINES_MOST; l++) {
+        int found = 0, which = 0;
+        for (int p = 0; p < peak_count; p++)
+            if (fabs(at(old, peaks[p]) + shift - lines[l]) <= window_nm) {
+                found++;
+                which = p;
+            }
+        if (found != 1)
+            continue;
+        double off = at(old, peaks[which]) + shift - lines[l];
+        out->pixel[out->count] = peaks[which];
+        out->nm[out->count++] = lines[l];
+        out->off += off * off;
+    }
+}
+
+static bool better(const struct matches *a, const struct matches *b)
+{
+    return a->count > b->count || (a->count == b->count && a->off < b->off);
+}
+
+static bool best_shift(const double old[ORDER], const double *peaks, int peak_count,
+                       const double *lines, struct matches *best, double *shift, struct error *err)
+{
+    struct matches rival = {0}, tried;
+    *best = rival;
+    *shift = 0;
+    for (int pass = 0; pass < 2; pass++)
+        for (int s = -SHIFT_STEPS; s <= SHIFT_STEPS; s++) {
+            double by = s * shift_most_nm / SHIFT_STEPS;
+            match(old, by, peaks, peak_count, lines, &tried);
+            if (pass == 0 && better(&tried, best)) {
+                *best = tried;
+                *shift = by;
+            }
+            if (pass == 1 && fabs(by - *shift) > other_shift_nm && better(&tried, &rival))
+                rival = tried;
+        }
+    if (best->count < REFIT_LINES_LEAST)
+        return fail(err, ERROR_DATA, "%d of the lamp's lines found among %d peaks; at least %d",
+                    best->count, peak_count, REFIT_LINES_LEAST);
+    return rival.count < best->count ||
+           fail(err, ERROR_DATA, "ambiguous: two shifts of the axis match %d lines each",
+                best->count);
+}
+
+static bool solve(double m[ORDER][ORDER + 1], double out[ORDER])
+{
+    for (int i = 0; i < ORDER; i++) {
+        int pivot = i;
+        for (int r = i + 1; r < ORDER; r++)
+            if (fabs(m[r][i]) > fabs(m[pivot][i]))
+                pivot = r;
+        if (fabs(m[pivot][i]) < 1e-12)
+            return false;
+        for (int c = 0; c <= ORDER; c++) {
+            double swap = m[i][c];
+            m[i][c] = m[pivot][c];
+            m[pivot][c] = swap;
+        }
+        for (int r = 0; r < ORDER; r++)
+            for (int c = ORDER; r != i && c >= i; c--)
+                m[r][c] -= m[r][i] / m[i][i] * m[i][c];
+    }
+    for (int i = 0; i < ORDER; i++)
+        out[i] = m[i][ORDER] / m[i][i];
+    return true;
+}
+
+// On -1..1, where powers stay apart, as a correction of the old axis.
+static bool fit(const struct matches *m, const double old[ORDER], int pixels, double out[ORDER])
+{
+    double normal[ORDER][ORDER + 1] = {0}, more[ORDER];
+    const double half = pixels / 2.0;
+    for (int k = 0; k < m->count; k++) {
+        double x = m->pixel[k] / half - 1, power[ORDER] = {1, x, x * x, x * x * x};
+        for (int i = 0; i < ORDER; i++) {
+            for (int j = 0; j < ORDER; j++)
+                normal[i][j] += power[i] * power[j];
+            normal[i][ORDER] += power[i] * (m->nm[k] - at(old, m->pixel[k]));
+        }
+    }
+    if (!solve(normal, more))
+        return false;
+    const double a = more[0], b = more[1], c = more[2], d = more[3];
+    out[0] = old[0] + a - b + c - d;
+    out[1] = old[1] + (b - 2 * c + 3 * d) / half;
+    out[2] = old[2] + (c - 3 * d) / (half * half);
+    out[3] = old[3] + d / (half * half * half);
+    return true;
+}
+
+static bool check_fit(const struct matches *m, const double c[ORDER], int pixels, double *rms,
+                      struct error *err)
+{
+    double sum = 0;
+    for (int k = 0; k < m->count; k++) {
+        double off = at(c, m->pixel[k]) - m->nm[k];
+        if (!(fabs(off) <= most_left_nm))
+            return fail(err, ERROR_DATA, "the line at %g nm is left %.2f nm off", m->nm[k], off);
+        sum += off * off;
+    }
+    for (int i = 0; i < pixels; i++)
+        if (!(at(c, i + 0.5) > at(c, i - 0.5)))
+            return fail(err, ERROR_DATA, "fitted wavelengths do not ascend at pixel %d", i);
+    *rms = sqrt(sum / m->count);
+    return true;
+}
+
+bool refit_wavelengths(const double *counts, int pixels, const double old[4],
+                       const double *lines_nm, struct refit *out, struct error *err)
+{
+    double peaks[PEAKS_MOST];
+    struct matches m;
+    struct refit r;
+    int peak_count = find_peaks(counts, pixels, peaks);
+    if (!best_shift(old, peaks, peak_count, lines_nm, &m, &r.shift_nm, err))
+        return false;
+    double span = m.nm[m.count - 1] - m.nm[0];
+    if (span < least_span_nm)
+        return fail(err, ERROR_DATA, "the %d lines found span %.0f nm; at least %.0f nm", m.count,
+                    span, least_span_nm);
+    if (!fit(&m, old, pixels, r.wavelength))
+        return fail(err, ERROR_DATA, "the %d lines found do not fix the axis", m.count);
+    r.lines = m.count;
+    if (!check_fit(&m, r.wavelength, pixels, &r.rms_nm, err))
+        return false;
+    *out = r;
+    return true;
+}

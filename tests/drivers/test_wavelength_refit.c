@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "drivers/wavelength_refit.h"
+
+#include <cmocka.h>
+
+#include "tests/fakes/near.h"
+
+enum { PIXELS = 2048 };
+
+// The axis of a real Flame-S, and the same after a year.
+static const double true_nm[4] = {189.80809, 0.38583738, -1.9762801e-05, -9.4763608e-10};
+static const double old_nm[4] = {191.10, 0.38530, -1.95e-05, -9.6e-10};
+static const double close_nm = 0.05; // a seventh of a pixel, with noise and lines of 1.3 nm width
+
+static double axis(const double c[4], double x)
+{
+    return c[0] + x * (c[1] + x * (c[2] + x * c[3]));
+}
+
+static double chance(uint64_t *seed)
+{
+    *seed = *seed * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+    return (double)(*seed >> 11) / (double)(UINT64_C(1) << 52) - 1;
+}
+
+// Gaussian lines between least_nm and most_nm on a noisy floor.
+static void lamp(double least_nm, double most_nm, double counts[PIXELS])
+{
+    const double sigma = 1.3 / 2.355;
+    uint64_t seed = 3;
+    for (int i = 0; i < PIXELS; i++) {
+        double nm = axis(true_nm, i);
+        counts[i] = 20 * chance(&seed);
+        for (int l = 0; refit_mercury_argon[l] > 0; l++) {
+            double line = refit_mercury_argon[l], off = (nm - line) / sigma;
+            if (line >= least_nm && line <= most_nm)
+                counts[i] += (3000 + 9000 * (l % 4)) * exp(-0.5 * off * off);
+        }
+    }
+}
+
+static void a_drifted_axis_is_found_again(void **state)
+{
+    (void)state;
+    static double counts[PIXELS];
+    struct refit r;
+    struct error err = {0};
+    lamp(250, 880, counts);
+    bool ok = refit_wavelengths(counts, PIXELS, old_nm, refit_mercury_argon, &r, &err);
+    if (!ok)
+        print_error("%s\n", err.text);
+    assert_true(ok);
+    assert_true(r.lines >= 15);
+    assert_true(r.rms_nm < close_nm);
+    for (int i = 200; i < PIXELS; i += 50)
+        assert_near(axis(r.wavelength, i), axis(true_nm, i), close_nm);
+}
+
+static void a_right_axis_stays(void **state)
+{
+    (void)state;
+    static double counts[PIXELS];
+    struct refit r;
+    lamp(250, 880, counts);
+    assert_true(refit_wavelengths(counts, PIXELS, true_nm, refit_mercury_argon, &r, NULL));
+    for (int i = 200; i < PIXELS; i += 50)
+        assert_near(axis(r.wavelength, i), axis(true_nm, i), close_nm);
+}
+
+static void refused(const double counts[PIXELS], const double *lines, const char *why)
+{
+    struct refit r = {.lines = -1};
+    struct error err = {0};
+    assert_false(refit_wavelengths(counts, PIXELS, old_nm, lines, &r, &err));
+    assert_int_equal(err.code, ERROR_DATA);
+    if (!strstr(err.text, why))
+        print_error("%s\n", err.text);
+    assert_non_null(strstr(err.text, why));
+    assert_int_equal(r.lines, -1);
+}
+
+static void too_few_lines_are_refused(void **state)
+{
+    (void)state;
+    static double counts[PIXELS];
+    lamp(500, 600, counts);
+    refused(counts, refit_mercury_argon, "at least 6");
+    memset(counts, 0, sizeof counts);
+    refused(counts, refit_mercury_argon, "at least 6");
+}
+
+static void lines_over_a_small_part_of_the_axis_are_refused(void **state)
+{
+    (void)state;
+    static double counts[PIXELS];
+    lamp(690, 830, counts);
+    refused(counts, refit_mercury_argon, "span");
+}
+
+static void a_comb_that_fits_in_two_ways_is_refused(void **state)
+{
+    (void)state;
+    static double counts[PIXELS];
+    static double comb[64];
+    for (int l = 0; l < 40; l++)
+        comb[l] = 300 + 5 * l;
+    for (int i = 0; i < PIXELS; i++)
+        for (int l = 0; l < 90; l++)
+            counts[i] += 1e4 * exp(-pow((axis(true_nm, i) - 270 - 5.0 * l) / 0.5, 2));
+    refused(counts, comb, "ambiguous");
+}
+
+static void noise_and_a_smooth_lamp_have_no_lines(void **state)
+{
+    (void)state;
+    static double counts[PIXELS];
+    uint64_t seed = 5;
+    for (int i = 0; i < PIXELS; i++)
+        counts[i] = 30000 * exp(-pow((i - 1200) / 500.0, 2)) + 50 * chance(&seed);
+    refused(counts, refit_mercury_argon, "at least 6");
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_drifted_axis_is_found_again),
+        cmocka_unit_test(a_right_axis_stays),
+        cmocka_unit_test(too_few_lines_are_refused),
+        cmocka_unit_test(lines_over_a_small_part_of_the_axis_are_refused),
+        cmocka_unit_test(a_comb_that_fits_in_two_ways_is_refused),
+        cmocka_unit_test(noise_and_a_smooth_lamp_have_no_lines),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
