@@ -23,13 +23,14 @@ struct path_field {
     size_t size;
 };
 
-enum { PATH_FIELDS = 10 };
+enum { PATH_FIELDS = 11 };
 
 static void path_fields(struct booth_settings *b, struct path_field out[PATH_FIELDS])
 {
     const struct path_field fields[PATH_FIELDS] = {
 #define FIELD(section, key, field) {section, key, field, sizeof field}
         FIELD("spectrometer", "calibration", b->spectrometer.options.calibration),
+        FIELD("spectrometer", "darks", b->spectrometer.options.darks),
         FIELD("spectrometer", "file", b->spectrometer.options.file),
         FIELD("accelerometer", "port", b->accelerometer.options.port),
         FIELD("radiometer", "port", b->radiometer.options.port),

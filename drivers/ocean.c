@@ -6,12 +6,12 @@
 #include <string.h>
 
 #include "drivers/deadline.h"
-#include "drivers/ocean_counts.h"
+#include "drivers/exposure.h"
+#include "drivers/irradiance.h"
 #include "drivers/ocean_usb.h"
 
 enum {
     COMMAND_INITIALISE = 0x01,
-    COMMAND_INTEGRATION = 0x02,
     COMMAND_SLOT = 0x05,
     COMMAND_SPECTRUM = 0x09,
     COMMAND_TRIGGER = 0x0a,
@@ -35,6 +35,9 @@ struct spectrometer {
     struct ocean_usb *usb;
     struct ocean_unit unit;
     struct ocean_axis axis;
+    struct ocean_darks darks;
+    struct exposure exposure;
+    bool high_speed;
     char firmware[16];
     bool flame;
     int integration_us;
@@ -64,29 +67,39 @@ static bool query_status(struct spectrometer *s, int64_t deadline_ns, struct sta
         return while_doing(err, "asking for the status");
     uint32_t us = r[2] | (uint32_t)r[3] << 8 | (uint32_t)r[4] << 16 | (uint32_t)r[5] << 24;
     *out = (struct status){r[0] | r[1] << 8, us > INT32_MAX ? INT32_MAX : (int)us, r[7], r[14]};
-    if (out->pixels != OCEAN_PIXELS)
+    const struct ocean_model *m = ocean_usb_model(s->usb);
+    if (out->pixels != m->raw_pixels && out->pixels != m->pixels)
         return fail(err, ERROR_DATA, "status tells %d pixels instead of %d", out->pixels,
-                    OCEAN_PIXELS);
+                    m->raw_pixels);
     if (out->speed != SPEED_FULL && out->speed != SPEED_HIGH)
         return fail(err, ERROR_DATA, "status tells USB speed %02x", (unsigned)out->speed);
     return true;
 }
 
+// Whether a unit whose command counts milliseconds tells them or microseconds,
+// no source says; what is too short for it must be the former.
+static int status_us(const struct ocean_model *m, int told)
+{
+    return told < m->least_us && told <= INT32_MAX / m->base_us ? told * m->base_us : told;
+}
+
 // The unit ignores a value it does not like without a word: read it back.
 static bool set_integration(struct spectrometer *s, int us, int64_t deadline_ns, struct error *err)
 {
-    const uint8_t command[] = {COMMAND_INTEGRATION, us & 255, us >> 8 & 255, us >> 16 & 255,
-                               us >> 24 & 255};
+    const struct ocean_model *m = ocean_usb_model(s->usb);
+    const int slack = us > 655000 || m->base_us > 1 ? 1000 : 10;
+    uint8_t command[5];
     struct status status = {0};
+    ocean_integration_command(m, us, command);
     s->stale = STALE_READINGS;
     if (s->slowest_us < s->integration_us)
         s->slowest_us = s->integration_us;
     if (!ocean_usb_send(s->usb, command, sizeof command, deadline_ns, err) ||
         !query_status(s, deadline_ns, &status, err))
         return while_doing(err, "setting the integration time");
-    if (abs(status.integration_us - us) > (us > 655000 ? 1000 : 10))
-        return fail(err, ERROR_RETRY, "integration time is %d us after setting %d us",
-                    status.integration_us, us);
+    int told = status_us(m, status.integration_us);
+    if (abs(told - us) > slack)
+        return fail(err, ERROR_RETRY, "integration time is %d us after setting %d us", told, us);
     s->integration_us = us;
     return true;
 }
@@ -108,7 +121,7 @@ static bool read_unit(struct spectrometer *s, int64_t deadline_ns, struct error 
         if (!query(s, (const uint8_t[]){COMMAND_SLOT, (uint8_t)i}, 2, slots[i], OCEAN_SLOT_BYTES,
                    deadline_ns, err))
             return while_doing(err, "reading information slot %d", i);
-    return ocean_unit_parse(slots, &s->unit, err);
+    return ocean_unit_parse(ocean_usb_model(s->usb), slots, &s->unit, err);
 }
 
 // Only a label hangs on it, so a unit that does not tell is opened all the same.
@@ -136,7 +149,8 @@ static bool wake(struct spectrometer *s, int64_t deadline_ns, struct error *err)
         !ocean_usb_send(s->usb, (const uint8_t[]){COMMAND_INITIALISE}, 1, deadline_ns, err) ||
         !query_status(s, deadline_ns, &status, err))
         return while_doing(err, "waking the spectrometer");
-    s->slowest_us = status.integration_us;
+    s->slowest_us = status_us(ocean_usb_model(s->usb), status.integration_us);
+    s->high_speed = status.speed == SPEED_HIGH;
     s->active_ns = clock_now_ns();
     return read_unit(s, deadline_ns, err);
 }
@@ -175,9 +189,48 @@ static bool load_calibration(struct spectrometer *s, struct error *err)
         return fail(err, ERROR_CONFIG,
                     "calibration: the spectrometer needs a file of uJ per count, none is given");
     bool ok = csv_load(s->options.calibration, &table, err) &&
-              ocean_axis_make(&s->unit, &table, &s->axis, err);
+              ocean_axis_make(&s->unit, &table, s->options.collector_mm2, &s->axis, err);
     table_fini(&table);
     return ok;
+}
+
+static bool load_darks(struct spectrometer *s, struct error *err)
+{
+    struct table table = {0};
+    if (!*s->options.darks)
+        return true;
+    bool ok = csv_load(s->options.darks, &table, err) &&
+              ocean_darks_make(&s->unit, &table, &s->darks, err);
+    table_fini(&table);
+    return ok;
+}
+
+static bool set_wavelengths(struct spectrometer *s, struct error *err)
+{
+    const double *c = s->options.wavelength_nm;
+    if (c[0] == 0 && c[1] == 0 && c[2] == 0 && c[3] == 0)
+        return true;
+    return ocean_unit_rewave(&s->unit, c) ||
+           fail(err, ERROR_CONFIG,
+                "wavelength_nm: %g %g %g %g do not ascend through the visible on %s", c[0], c[1],
+                c[2], c[3], s->unit.serial);
+}
+
+static struct exposure_limits limits_of(const struct spectrometer *s, int longest_us)
+{
+    const struct ocean_model *m = s->unit.model;
+    longest_us = longest_us > m->most_us ? m->most_us : longest_us;
+    return (struct exposure_limits){s->options.mains_hz, m->least_us,
+                                    longest_us < m->least_us ? m->least_us : longest_us,
+                                    m->base_us};
+}
+
+static bool set_up(struct spectrometer *s, int64_t deadline_ns, struct error *err)
+{
+    struct exposure_limits limits = limits_of(s, s->options.longest_us);
+    return set_wavelengths(s, err) && load_calibration(s, err) && load_darks(s, err) &&
+           read_firmware(s, deadline_ns, err) && set_trigger_normal(s, deadline_ns, err) &&
+           set_integration(s, exposure_round(s->options.integration_us, &limits), deadline_ns, err);
 }
 
 static void ocean_close(struct spectrometer *s)
@@ -185,6 +238,7 @@ static void ocean_close(struct spectrometer *s)
     if (!s)
         return;
     ocean_usb_close(s->usb);
+    ocean_darks_fini(&s->darks);
     free(s);
 }
 
@@ -199,20 +253,22 @@ static struct spectrometer *ocean_open(const struct spectrometer_options *option
         return NULL;
     }
     s->options = *options;
-    int first_us =
-        ocean_round_exposure(options->integration_us, options->mains_hz, options->longest_us);
-    if (find_unit(s, deadline_ns, err) && load_calibration(s, err) &&
-        read_firmware(s, deadline_ns, err) && set_trigger_normal(s, deadline_ns, err) &&
-        set_integration(s, first_us, deadline_ns, err))
+    if (find_unit(s, deadline_ns, err) && set_up(s, deadline_ns, err))
         return s;
     ocean_close(s);
     return NULL;
 }
 
+static int64_t cycle_us(const struct spectrometer *s, int exposure_us)
+{
+    int64_t us = (int64_t)exposure_us + READOUT_US, least = s->unit.model->least_cycle_us;
+    return us > least ? us : least;
+}
+
 static int64_t time_for(const struct spectrometer *s, int readings)
 {
     int64_t us = s->slowest_us > s->integration_us ? s->slowest_us : s->integration_us;
-    return (readings * (us + READOUT_US) + us + MARGIN_US) * NS_PER_US;
+    return (readings * cycle_us(s, (int)us) + us + MARGIN_US) * NS_PER_US;
 }
 
 static bool fits(const struct spectrometer *s, int readings, int64_t deadline_ns)
@@ -236,23 +292,23 @@ static bool lost(struct spectrometer *s, struct error *err)
 // Whether the acquisitions that the unit makes on its own are over for sure.
 static bool is_idle(const struct spectrometer *s)
 {
-    int64_t cycle_us = s->slowest_us + READOUT_US;
-    return clock_now_ns() - s->active_ns >
-           ((1 + STALE_READINGS) * cycle_us + MARGIN_US) * NS_PER_US;
+    int64_t over_us = (1 + STALE_READINGS) * cycle_us(s, s->slowest_us) + MARGIN_US;
+    return s->unit.model->least_cycle_us == 0 &&
+           clock_now_ns() - s->active_ns > over_us * NS_PER_US;
 }
 
-static bool acquire_once(struct spectrometer *s, int64_t deadline_ns, uint16_t raw[OCEAN_PIXELS],
-                         struct interval *taken, struct error *err)
+static bool acquire_once(struct spectrometer *s, int64_t deadline_ns,
+                         uint16_t raw[OCEAN_PIXELS_MOST], struct interval *taken, struct error *err)
 {
-    uint8_t bytes[OCEAN_SPECTRUM_BYTES + 1];
+    uint8_t bytes[OCEAN_BYTES_MOST + 1];
     size_t count;
-    int64_t cycle_ns = (s->slowest_us + READOUT_US) * NS_PER_US;
+    int64_t cycle_ns = cycle_us(s, s->slowest_us) * NS_PER_US;
     int64_t request_ns = clock_now_ns();
     bool idle = is_idle(s);
     int timeout = deadline_ms(deadline_ns, 3 * s->slowest_us / 1000 + 1000);
     if (!ocean_usb_send(s->usb, (const uint8_t[]){COMMAND_SPECTRUM}, 1, deadline_ns, err) ||
-        !ocean_usb_spectrum(s->usb, bytes, sizeof bytes, timeout, &count, err) ||
-        !ocean_unpack(bytes, count, raw, err))
+        !ocean_usb_spectrum(s->usb, s->high_speed, bytes, sizeof bytes, timeout, &count, err) ||
+        !ocean_unpack(s->unit.model, bytes, count, raw, err))
         return false;
     s->active_ns = clock_now_ns();
     *taken = (struct interval){idle ? request_ns : request_ns - cycle_ns, s->active_ns};
@@ -260,7 +316,7 @@ static bool acquire_once(struct spectrometer *s, int64_t deadline_ns, uint16_t r
 }
 
 // One spectrum that began after the last change of exposure.
-static bool acquire(struct spectrometer *s, int64_t deadline_ns, uint16_t raw[OCEAN_PIXELS],
+static bool acquire(struct spectrometer *s, int64_t deadline_ns, uint16_t raw[OCEAN_PIXELS_MOST],
                     struct interval *taken, struct error *err)
 {
     if (s->slowest_us < s->integration_us || is_idle(s))
@@ -284,7 +340,7 @@ static bool acquire(struct spectrometer *s, int64_t deadline_ns, uint16_t raw[OC
 static bool add_reading(struct spectrometer *s, int64_t deadline_ns, struct ocean_reading *reading,
                         struct interval *taken, struct error *err)
 {
-    uint16_t raw[OCEAN_PIXELS];
+    uint16_t raw[OCEAN_PIXELS_MOST];
     struct interval one;
     bool ok = acquire(s, deadline_ns, raw, &one, err);
     if (!ok && err->code == ERROR_RETRY && fits(s, s->stale + 1, deadline_ns))
@@ -294,7 +350,7 @@ static bool add_reading(struct spectrometer *s, int64_t deadline_ns, struct ocea
     if (reading->averaged == 0)
         *taken = one;
     taken->latest_ns = one.latest_ns;
-    ocean_reading_add(&s->unit, &s->axis, raw, reading);
+    ocean_reading_add(&s->unit, s->axis.used, raw, reading);
     return true;
 }
 
@@ -307,16 +363,21 @@ static void fill(const struct spectrometer *s, const struct ocean_reading *readi
     out->integration_us = reading->integration_us;
     out->averaged = reading->averaged;
     out->peak = reading->peak;
-    ocean_irradiance(&s->unit, &s->axis, s->options.collector_mm2, reading, &out->irradiance,
-                     &out->sigma);
+    struct ocean_dark dark;
+    bool known = ocean_dark_at(&s->darks, &s->unit, reading->integration_us, &dark);
+    const struct ocean_process process = {(enum bend)s->options.nonlinearity, s->options.boxcar,
+                                          known ? &dark : NULL};
+    ocean_irradiance(&s->unit, &s->axis, &process, reading, &out->irradiance, &out->sigma, NULL);
 }
 
-static int next_exposure(const struct spectrometer *s, const struct ocean_reading *reading,
+static int next_exposure(struct spectrometer *s, const struct ocean_reading *reading,
                          int longest_us)
 {
-    return ocean_next_exposure(s->integration_us, reading->peak,
-                               ocean_dark(reading) / s->unit.saturation, reading->saturated,
-                               s->options.mains_hz, longest_us);
+    const struct exposure_limits limits = limits_of(s, longest_us);
+    const struct exposure_seen seen = {s->integration_us, reading->peak,
+                                       ocean_black(&s->unit, reading) / s->unit.saturation,
+                                       reading->saturated};
+    return exposure_next(&s->exposure, &seen, &limits);
 }
 
 static enum spectrometer_status judge(const struct spectrometer *s,
@@ -326,8 +387,8 @@ static enum spectrometer_status judge(const struct spectrometer *s,
         return SPECTROMETER_SATURATED;
     if (settling)
         return SPECTROMETER_SETTLING;
-    return ocean_signal(&s->unit, &s->axis, reading) < weak_counts ? SPECTROMETER_WEAK
-                                                                   : SPECTROMETER_GOOD;
+    return ocean_signal(&s->unit, s->axis.used, reading) < weak_counts ? SPECTROMETER_WEAK
+                                                                       : SPECTROMETER_GOOD;
 }
 
 static bool ocean_read(struct spectrometer *s, int64_t deadline_ns, struct spectrum_sample *out,
@@ -336,8 +397,8 @@ static bool ocean_read(struct spectrometer *s, int64_t deadline_ns, struct spect
     struct error own;
     err = err ? err : &own;
     int64_t fair_us = (deadline_ns - clock_now_ns()) / NS_PER_US / (2 + STALE_READINGS);
-    int longest = ocean_round_exposure((double)fair_us - MARGIN_US, s->options.mains_hz,
-                                       s->options.longest_us);
+    const struct exposure_limits limits = limits_of(s, s->options.longest_us);
+    int longest = exposure_round((double)fair_us - MARGIN_US, &limits);
     if (s->integration_us > longest && !fits(s, s->stale + 1, deadline_ns) &&
         !set_integration(s, longest, deadline_ns, err))
         return lost(s, err);
@@ -364,7 +425,12 @@ static bool ocean_read(struct spectrometer *s, int64_t deadline_ns, struct spect
 static void ocean_identify(const struct spectrometer *s, struct instrument_identity *out)
 {
     memset(out, 0, sizeof *out);
-    snprintf(out->model, sizeof out->model, "%s", s->flame ? "Flame-S" : "USB2000+");
+    const char *name = s->unit.model->name, * or = strstr(name, " or ");
+    if (or)
+        snprintf(out->model, sizeof out->model, "%.*s", s->flame ? 63 : (int)(or -name),
+                 s->flame ? or +4 : name);
+    else
+        snprintf(out->model, sizeof out->model, "%s", name);
     snprintf(out->serial, sizeof out->serial, "%s", s->unit.serial);
     snprintf(out->firmware, sizeof out->firmware, "FPGA %s%s", s->firmware,
              s->unit.order < 0 ? ", non-linearity not corrected" : "");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The driver of Ocean Optics USB2000+ and Flame-S; see ocean.md.
+// The driver of the Ocean Optics spectrometers in ocean_models.h; see ocean.md.
 #ifndef DRIVERS_OCEAN_H
 #define DRIVERS_OCEAN_H
 

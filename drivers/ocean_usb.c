@@ -12,15 +12,11 @@ enum {
     EP_COMMAND = 0x01,
     EP_REPLY = 0x81,
     EP_SPECTRUM = 0x82,
+    EP_SPLIT = 0x86,
     COMMAND_MS = 500,
     QUIET_MS = 10,
     DRAIN_TRIES = 32,
-    BUFFER_BYTES = 8192, // a multiple of every packet size, so that nothing overflows
-};
-
-const struct device_id ocean_ids[] = {
-    {DEVICE_USB, 0x2457, 0x101e, "Ocean Optics USB2000+ or Flame-S"},
-    {0},
+    BUFFER_BYTES = 16384, // a multiple of every packet size, so that nothing overflows
 };
 
 // What a unit looks like whose firmware did not load from its EEPROM.
@@ -29,6 +25,7 @@ static const struct device_id bare_chip = {DEVICE_USB, 0x04b4, 0x8613, "bare FX2
 struct ocean_usb {
     libusb_context *context;
     libusb_device_handle *handle;
+    const struct ocean_model *model;
     bool claimed;
     uint8_t buffer[BUFFER_BYTES];
 };
@@ -57,23 +54,24 @@ static bool fail_usb(struct error *err, int code, const char *doing)
     return fail(err, ERROR_SYSTEM, "%s: %s", doing, libusb_error_name(code));
 }
 
-static bool is(libusb_device *device, const struct device_id *id)
+static bool is(const struct libusb_device_descriptor *d, const struct device_id *id)
 {
-    struct libusb_device_descriptor d;
-    return libusb_get_device_descriptor(device, &d) == 0 && d.idVendor == id->vendor &&
-           d.idProduct == id->product;
+    return d->idVendor == id->vendor && d->idProduct == id->product;
 }
 
 // The index-th unit, referenced; bare tells whether an unloaded chip was seen.
-static libusb_device *find(libusb_context *context, int index, bool *bare)
+static libusb_device *find(struct ocean_usb *usb, int index, bool *bare)
 {
     libusb_device **list, *found = NULL;
-    ssize_t count = libusb_get_device_list(context, &list);
+    ssize_t count = libusb_get_device_list(usb->context, &list);
     for (ssize_t i = 0; i < count && !found; i++) {
-        *bare = *bare || is(list[i], &bare_chip);
-        for (const struct device_id *id = ocean_ids; id->name; id++)
-            if (is(list[i], id) && index-- == 0)
-                found = libusb_ref_device(list[i]);
+        struct libusb_device_descriptor d;
+        if (libusb_get_device_descriptor(list[i], &d) != 0)
+            continue;
+        *bare = *bare || is(&d, &bare_chip);
+        usb->model = d.idVendor == OCEAN_VENDOR ? ocean_model(d.idProduct) : NULL;
+        if (usb->model && index-- == 0)
+            found = libusb_ref_device(list[i]);
     }
     if (count >= 0)
         libusb_free_device_list(list, 1);
@@ -89,7 +87,7 @@ static bool has_bulk(const struct libusb_interface_descriptor *face, int address
     return false;
 }
 
-static bool check_descriptors(libusb_device *device, struct error *err)
+static bool check_descriptors(const struct ocean_usb *usb, libusb_device *device, struct error *err)
 {
     struct libusb_config_descriptor *config;
     int code = libusb_get_config_descriptor(device, 0, &config);
@@ -98,9 +96,10 @@ static bool check_descriptors(libusb_device *device, struct error *err)
     bool fits = config->bNumInterfaces > 0 && config->interface[0].num_altsetting > 0;
     const struct libusb_interface_descriptor *face = fits ? config->interface[0].altsetting : NULL;
     fits = fits && has_bulk(face, EP_COMMAND) && has_bulk(face, EP_REPLY) &&
-           has_bulk(face, EP_SPECTRUM);
+           has_bulk(face, EP_SPECTRUM) && (!usb->model->split_bytes || has_bulk(face, EP_SPLIT));
     libusb_free_config_descriptor(config);
-    return fits || fail(err, ERROR_DATA, "the spectrometer lacks one of the endpoints 01, 81, 82");
+    return fits || fail(err, ERROR_DATA, "the %s lacks one of the endpoints 01, 81, 82%s",
+                        usb->model->name, usb->model->split_bytes ? ", 86" : "");
 }
 
 static bool claim(struct ocean_usb *usb, struct error *err)
@@ -124,12 +123,12 @@ static bool open_on_bus(struct ocean_usb *usb, int index, struct error *err)
     int code = libusb_init(&usb->context);
     if (code)
         return fail_usb(err, code, "starting libusb");
-    libusb_device *device = find(usb->context, index, &bare);
+    libusb_device *device = find(usb, index, &bare);
     if (!device)
         return fail(err, ERROR_GONE, "no spectrometer on the USB bus%s",
                     bare ? "; a bare FX2 (04b4:8613) is: its firmware did not load, replug it"
                          : "");
-    bool fits = check_descriptors(device, err);
+    bool fits = check_descriptors(usb, device, err);
     code = fits ? libusb_open(device, &usb->handle) : 0;
     libusb_unref_device(device);
     if (code)
@@ -148,6 +147,11 @@ struct ocean_usb *ocean_usb_open(int index, struct error *err)
         return usb;
     ocean_usb_close(usb);
     return NULL;
+}
+
+const struct ocean_model *ocean_usb_model(const struct ocean_usb *usb)
+{
+    return usb->model;
 }
 
 void ocean_usb_close(struct ocean_usb *usb)
@@ -202,14 +206,20 @@ bool ocean_usb_reply(struct ocean_usb *usb, uint8_t *bytes, size_t count, int64_
     return true;
 }
 
-bool ocean_usb_spectrum(struct ocean_usb *usb, uint8_t *bytes, size_t size, int timeout_ms,
-                        size_t *count, struct error *err)
+// The first part decides how long to wait, the rest follows at once.
+bool ocean_usb_spectrum(struct ocean_usb *usb, bool high_speed, uint8_t *bytes, size_t size,
+                        int timeout_ms, size_t *count, struct error *err)
 {
-    int moved;
-    int code = bulk(usb, EP_SPECTRUM, usb->buffer, BUFFER_BYTES, timeout_ms, &moved);
+    int first = 0, moved = 0, code = 0, split = high_speed ? usb->model->split_bytes : 0;
+    const int64_t end_ns = clock_now_ns() + timeout_ms * NS_PER_MS;
+    if (split)
+        code = bulk(usb, EP_SPLIT, usb->buffer, split, timeout_ms, &first);
+    if (!code && first == split)
+        code = bulk(usb, EP_SPECTRUM, usb->buffer + first, BUFFER_BYTES / 2,
+                    deadline_ms(end_ns, split ? COMMAND_MS : timeout_ms), &moved);
     if (code)
         return fail_usb(err, code, "waiting for a spectrum");
-    *count = (size_t)moved;
+    *count = (size_t)(first + moved);
     memcpy(bytes, usb->buffer, *count < size ? *count : size);
     return true;
 }
@@ -233,6 +243,7 @@ static bool drain_endpoint(struct ocean_usb *usb, int endpoint, int64_t deadline
 
 bool ocean_usb_drain(struct ocean_usb *usb, int64_t deadline_ns, struct error *err)
 {
-    return drain_endpoint(usb, EP_SPECTRUM, deadline_ns, err) &&
+    return (!usb->model->split_bytes || drain_endpoint(usb, EP_SPLIT, deadline_ns, err)) &&
+           drain_endpoint(usb, EP_SPECTRUM, deadline_ns, err) &&
            drain_endpoint(usb, EP_REPLY, deadline_ns, err);
 }

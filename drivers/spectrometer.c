@@ -19,6 +19,7 @@ const char *spectrometer_status_name(enum spectrometer_status status)
     return "unknown";
 }
 
+static const char *const bend_names[] = {"above dark", "as read", "off", NULL};
 static const char *const unit_names[] = {"uW/cm2/nm", "mW/m2/nm", "W/m2/nm", NULL};
 
 const struct setting spectrometer_settings[] = {
@@ -37,6 +38,17 @@ const struct setting spectrometer_settings[] = {
      .help = "Longest exposure chosen by itself: in the dark a reading takes three of them."},
     {"average", SETTING_INT, FIELD(average), .least = 1, .most = 100, .unit = "", .preset = "1",
      .help = "Readings averaged into one sample."},
+    {"boxcar", SETTING_INT, FIELD(boxcar), .least = 0, .most = 100, .unit = "px", .preset = "0",
+     .help = "Half width of the moving mean over pixels; 0 keeps the full resolution."},
+    {"nonlinearity", SETTING_ENUM, FIELD(nonlinearity), .unit = "", .choices = bend_names,
+     .preset = "above dark",
+     .help = "What the unit's linearity polynomial is over: as its calibration was made."},
+    {"darks", SETTING_TEXT, FIELD(darks), SIZE(darks), .unit = "", .preset = "",
+     .help = "CSV of stored dark spectra: a row a pixel, a column an exposure in us "
+             "(us100000x20: mean of 20); empty: optically black pixels only."},
+    {"wavelength_nm", SETTING_VECTOR, FIELD(wavelength_nm), .size = 4, .least = -10000,
+     .most = 10000, .unit = "nm", .preset = "0 0 0 0",
+     .help = "Wavelength coefficients of a refit over pixel^0..3; zeroes: the unit's own."},
     {"file", SETTING_TEXT, FIELD(file), SIZE(file), .unit = "", .preset = "",
      .help = "Driver replay: file of OceanView, SpectraSuite, Jaz, a .sp or \"nm, value\"."},
     {"file_unit", SETTING_ENUM, FIELD(file_unit), .unit = "", .choices = unit_names,

@@ -42,15 +42,19 @@ struct instrument_identity {
 enum file_unit { FILE_UW_CM2, FILE_MW_M2, FILE_W_M2 };
 
 struct spectrometer_options {
-    char serial[64];       // "" = the first one found
-    char calibration[512]; // file of uJ/count per nm; required for absolute readings
-    double collector_mm2;  // area of the cosine corrector, 0.01..10000
-    double mains_hz;       // 50 or 60: exposures are multiples of half its period
-    int integration_us;    // first exposure, 1000..65535000
-    int longest_us;        // longest exposure it chooses itself, 1000..65535000
-    int average;           // readings per sample, 1..100
-    char file[512];        // replay: the file
-    int file_unit;         // replay: an enum file_unit
+    char serial[64];         // "" = the first one found
+    char calibration[512];   // file of uJ/count per nm; required for absolute readings
+    double collector_mm2;    // area of the cosine corrector, 0.01..10000
+    double mains_hz;         // 50 or 60: exposures are multiples of half its period
+    int integration_us;      // first exposure, 1000..65535000
+    int longest_us;          // longest exposure it chooses itself, 1000..65535000
+    int average;             // readings per sample, 1..100
+    int boxcar;              // half width in pixels, 0..100
+    int nonlinearity;        // an enum bend (drivers/irradiance.h)
+    char darks[512];         // file of stored dark spectra, "" = black pixels only
+    double wavelength_nm[4]; // coefficients over the pixel in place of the unit's own; all 0: those
+    char file[512];          // replay: the file
+    int file_unit;           // replay: an enum file_unit
 };
 
 extern const struct setting spectrometer_settings[];

@@ -27,6 +27,12 @@ static void every_instrument_has_its_rule(void **state)
     (void)state;
     char *text = rules();
     assert_non_null(strstr(text, "ATTR{idVendor}==\"2457\", ATTR{idProduct}==\"101e\""));
+    const char *const siblings[] = {"1012", "1016", "1018", "1022", "102a"};
+    for (int i = 0; i < 5; i++) {
+        char wanted[64];
+        snprintf(wanted, sizeof wanted, "ATTR{idProduct}==\"%s\"", siblings[i]);
+        assert_non_null(strstr(text, wanted));
+    }
     assert_non_null(strstr(text, "KERNELS==\"0005:057E:0306.*\""));
     assert_non_null(strstr(text, "KERNELS==\"0005:057E:0330.*\""));
     assert_non_null(strstr(text, "ATTRS{idVendor}==\"1a86\""));
