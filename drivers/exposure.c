@@ -34,10 +34,13 @@ int exposure_round(double us, const struct exposure_limits *limits)
     return (int)(us < limits->least_us ? us + step : us);
 }
 
-static void notice_other_light(struct exposure *e, double rate)
+// What saturated would not any more, or the signal is not that of the rest.
+static void notice_other_light(struct exposure *e, double rate, double dark)
 {
-    if (e->rest_rate > 0 &&
-        (rate > e->rest_rate * other_light || rate * other_light < e->rest_rate))
+    bool dimmer = e->saturating_us > 0 && dark + rate * e->saturating_us < 1 / other_light;
+    bool another = e->rest_rate > 0 &&
+                   (rate > e->rest_rate * other_light || rate * other_light < e->rest_rate);
+    if (dimmer || another)
         *e = (struct exposure){0};
 }
 
@@ -70,7 +73,7 @@ int exposure_next(struct exposure *e, const struct exposure_seen *seen,
     int next = seen->us;
     double rate = (seen->peak - seen->dark) / seen->us;
     if (!seen->saturated)
-        notice_other_light(e, rate);
+        notice_other_light(e, rate, seen->dark);
     bool fine = seen->peak >= lowest && seen->peak <= highest;
     if (seen->saturated)
         next = after_saturation(e, seen, limits);
@@ -78,8 +81,8 @@ int exposure_next(struct exposure *e, const struct exposure_seen *seen,
         next = towards_aim(
             seen, e->saturating_us ? clear_of_saturation * e->saturating_us : limits->longest_us,
             limits);
-    if (next > limits->longest_us)
-        next = exposure_round(limits->longest_us, limits);
+    if (next > limits->longest_us) // less time was given: no change of light
+        return exposure_round(limits->longest_us, limits);
     if (next != seen->us)
         e->changes++;
     else if (!seen->saturated && e->rest_rate <= 0)

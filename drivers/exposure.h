@@ -40,7 +40,8 @@ int exposure_round(double us, const struct exposure_limits *limits);
 // - never again as long as 80 % of what saturated in the same light;
 // - after EXPOSURE_CHANGES_MOST changes in the same light it only goes down,
 //   and only for saturation. The light is another when the signal per time
-//   leaves 2/3..3/2 of what it was at rest.
+//   leaves 2/3..3/2 of what it was at rest, or what saturated would give less
+//   than 2/3 of saturation.
 int exposure_next(struct exposure *e, const struct exposure_seen *seen,
                   const struct exposure_limits *limits);
 

@@ -27,10 +27,11 @@ struct spectrum_sample {
     int integration_us; // of this reading
     int averaged;       // readings averaged, >= 1
     double peak;        // largest raw count over saturation, 0..1
-    struct spectrum
-        irradiance;        // W m-2 nm-1 on the inner grid; 0 where the instrument does not reach
-    struct spectrum sigma; // standard uncertainty of it (shot, read, dark), same unit; all 0
-                           // where none is known (replay)
+    // W m-2 nm-1 on the inner grid; 0 where the instrument does not reach.
+    struct spectrum irradiance;
+    // Standard uncertainty of it (shot, read, dark, calibration), same unit; all
+    // 0 where none is known (replay).
+    struct spectrum sigma;
 };
 
 struct instrument_identity {
