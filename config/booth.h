@@ -93,7 +93,7 @@ struct booth_settings {
     } control;
 };
 
-enum { BOOTH_SECTIONS = 14, BOOTH_ROWS_MOST = 128, BOOTH_DRIVERS_MOST = 16 };
+enum { BOOTH_SECTIONS = 14, BOOTH_ROWS_MOST = 256, BOOTH_DRIVERS_MOST = 16 };
 
 // The sections of boothd.conf over one booth_settings. Filled by
 // booth_tables_init; must not be copied or moved, since it points into itself.

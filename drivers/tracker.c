@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/tracker.h"
 
+#include "drivers/opentrack.h"
 #include "drivers/wiimote.h"
 
 #define FIELD(name) SETTING_FIELD(struct tracker_options, name)
@@ -33,7 +34,15 @@ const struct setting tracker_settings[] = {
      .preset = "0 0 0",
      .help = "From the marker origin to the midpoint of the eyes: observer's right, up, into the "
              "head."},
+    {"address", SETTING_TEXT, FIELD(address), SIZE(address), .unit = "", .preset = "127.0.0.1",
+     .help = "opentrack: numeric IPv4 address to listen at; 0.0.0.0 lets the whole network in."},
+    {"port", SETTING_INT, FIELD(port), .least = 1, .most = 65535, .unit = "", .preset = "4242",
+     .help = "opentrack: UDP port to listen at."},
+    {"origin_m", SETTING_VECTOR, FIELD(origin_m), 3, -5, 5, .unit = "m", .preset = "0 0 0",
+     .help = "opentrack: where its zero lies from the camera: observer's right, up, away from it."},
+    {"signs", SETTING_VECTOR, FIELD(signs), 6, -1, 1, .unit = "", .preset = "1 1 1 1 1 1",
+     .help = "opentrack: factors of x, y, z, yaw, pitch and roll; 0 leaves one out."},
     {0},
 };
 
-const struct tracker_driver *const tracker_drivers[] = {&wiimote_driver, NULL};
+const struct tracker_driver *const tracker_drivers[] = {&wiimote_driver, &opentrack_driver, NULL};

@@ -25,9 +25,9 @@ const char *tracker_status_name(enum tracker_status status);
 struct head_sample {
     struct interval taken;
     enum tracker_status status;
-    struct vec3 eye;       // midpoint of the eyes in the tracker frame, m
-    double reprojection_px; // rms residual of the pose
-    int markers;           // blobs seen, 0..4
+    struct vec3 eye;        // midpoint of the eyes in the tracker frame, m
+    double reprojection_px; // rms residual of the pose; 0 where the tracker has none
+    int markers;            // blobs seen, 0..4; 0 where the tracker has none
 };
 
 struct tracker_options {
@@ -36,6 +36,11 @@ struct tracker_options {
     int sensitivity;     // 1..5, 6 = greatest
     int marker;          // index into tracker_markers
     double eye_from_marker_m[3]; // marker origin to the midpoint of the eyes, marker frame
+    // opentrack only:
+    char address[64];   // numeric IPv4 address to listen at
+    int port;           // UDP, 1..65535; 0 = any free one
+    double origin_m[3]; // of opentrack's zero, tracker frame, -5..5
+    double signs[6];    // factors of x, y, z, yaw, pitch, roll, -1..1
 };
 
 extern const struct setting tracker_settings[];
@@ -44,7 +49,7 @@ extern const char *const tracker_markers[]; // "clip", "cap", NULL
 struct tracker;
 
 struct tracker_driver {
-    const char *name; // "wiimote"
+    const char *name; // "wiimote", "opentrack"
     struct tracker *(*open)(const struct tracker_options *options, int64_t deadline_ns,
                             struct error *err);
     bool (*read)(struct tracker *device, int64_t deadline_ns, struct head_sample *out,
