@@ -12,6 +12,8 @@ static const struct command FAMILIES[] = {
     {"bands", command_bands, "optimise|check", "the bands that carry reflectances"},
     {"session", command_session, "--config FILE --maps FOLDER -o FOLDER",
      "from bare settings to an accuracy report"},
+    {"list", command_list, "[--config FILE] [--json] | --udev",
+     "instruments found, their serial numbers and permissions; the udev rules"},
     {NULL, NULL, NULL, NULL},
 };
 

@@ -42,5 +42,6 @@ int command_colour(int argc, char **argv);
 int command_display(int argc, char **argv);
 int command_bands(int argc, char **argv);
 int command_session(int argc, char **argv);
+int command_list(int argc, char **argv);
 
 #endif

@@ -36,7 +36,7 @@ static bool fail_usb(struct error *err, int code, const char *doing)
     case LIBUSB_ERROR_ACCESS:
         return fail(err, ERROR_SYSTEM,
                     "%s: no permission; install the udev rules " UDEV_RULES_FILE
-                    " (boothd --udev) and replug",
+                    " (boothcal list --udev) and replug",
                     doing);
     case LIBUSB_ERROR_BUSY:
         return fail(err, ERROR_SYSTEM, "%s: another program uses the spectrometer", doing);

@@ -23,7 +23,7 @@ static bool fail_open(const char *path, struct error *err)
     if (errno == EACCES || errno == EPERM)
         return fail(err, ERROR_SYSTEM,
                     "%s: no permission; install the udev rules " UDEV_RULES_FILE
-                    " (boothd --udev) or join the group of the device",
+                    " (boothcal list --udev) or join the group of the device",
                     path);
     if (errno == EBUSY)
         return fail(err, ERROR_SYSTEM, "%s: another program uses the line", path);

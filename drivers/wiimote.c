@@ -209,7 +209,7 @@ static bool open_path(struct tracker *t, const struct hid_device_info *info, str
     if (access(info->path, R_OK | W_OK) != 0 && errno == EACCES)
         return fail(err, ERROR_SYSTEM,
                     "%s: no permission; install the udev rules " UDEV_RULES_FILE
-                    " (boothd --udev) and reconnect",
+                    " (boothcal list --udev) and reconnect",
                     info->path);
     return fail(err, ERROR_GONE, "%s: the Wii remote cannot be opened", info->path);
 }

@@ -176,7 +176,7 @@ static bool fail_connect(const char *port, struct error *err)
     if (errno == EACCES || errno == EPERM)
         return fail(err, ERROR_SYSTEM,
                     "%s: no permission; install the udev rules " UDEV_RULES_FILE
-                    " (boothd --udev) or join the group of the device",
+                    " (boothcal list --udev) or join the group of the device",
                     port);
     return fail(err, ERROR_GONE, "%s: %s", port, modbus_strerror(errno));
 }
