@@ -140,7 +140,7 @@ static const char *spectrometer_note(const void *sample)
 
 static const char *accelerometer_note(const void *sample)
 {
-    return ((const struct tilt_sample *)sample)->plausible ? "good" : "implausible";
+    return tilt_doubt_text(((const struct tilt_sample *)sample)->doubt);
 }
 
 static const char *tracker_note(const void *sample)

@@ -45,7 +45,7 @@ struct instrument_report {
     struct instrument_identity identity; // of the last time it was open
     uint64_t samples;                    // since the start
     int64_t latest_ns;                   // of the last sample; valid when samples > 0
-    char note[32];                       // of the last sample: "good", "seen", …
+    char note[64];                       // of the last sample: "good", "seen", …
     struct error error;                  // the last one; code NONE while all is well
 };
 

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/accelerometer.h"
 
+#include "drivers/modbus_map.h"
 #include "drivers/witmotion.h"
 
 #define FIELD(name) SETTING_FIELD(struct accelerometer_options, name)
 #define SIZE(name) SETTING_SIZE(struct accelerometer_options, name)
 
-const char *const accelerometer_models[] = {"wt901c485", "hwt9073", NULL};
+const char *const accelerometer_models[] = {"wt901c485", "hwt9073", "generic", NULL};
+
+static const double gravity_m_s2 = 9.81, gravity_slack = 0.3;
+static const double agreement_deg = 2;
 
 const struct setting accelerometer_settings[] = {
     {"port", SETTING_TEXT, FIELD(port), SIZE(port), .unit = "", .preset = "/dev/ttyUSB0",
@@ -19,6 +23,37 @@ const struct setting accelerometer_settings[] = {
      .preset = "wt901c485", .help = "Which register map the sensor has."},
     {"offset_deg", SETTING_DOUBLE, FIELD(offset_deg), .least = -180, .most = 180, .unit = "deg",
      .preset = "0", .help = "Added to the tilt, for a sensor not mounted flush."},
+    {"function", SETTING_INT, FIELD(function), .least = 3, .most = 4, .unit = "", .preset = "3",
+     .help = "Model generic: Modbus function that reads, 3 holding or 4 input registers."},
+    {"accel_register", SETTING_INT, FIELD(accel_register), .least = -1, .most = 65535, .unit = "",
+     .preset = "-1",
+     .help = "Model generic: first register of the acceleration's x, y, z; -1 none."},
+    {"accel_format", SETTING_ENUM, FIELD(accel_format), .unit = "", .choices = modbus_formats,
+     .preset = "s16", .help = "Model generic: how one acceleration is written."},
+    {"accel_scale", SETTING_DOUBLE, FIELD(accel_scale), .least = -1000, .most = 1000,
+     .unit = "m/s2", .preset = "0.0047884033",
+     .help = "Model generic: acceleration per count; the preset is 16 g by 32768."},
+    {"accel_offset", SETTING_DOUBLE, FIELD(accel_offset), .least = -4294967296.0,
+     .most = 4294967296.0, .unit = "", .preset = "0",
+     .help = "Model generic: counts added to an acceleration before scaling."},
+    {"accel_axes", SETTING_VECTOR, FIELD(accel_axes), 3, -3, 3, .unit = "", .preset = "1 2 3",
+     .help = "Model generic: the sensor's axes (1, 2, 3, negative when turned round) that point to "
+             "the screen's right, up and out."},
+    {"angle_register", SETTING_INT, FIELD(angle_register), .least = -1, .most = 65535, .unit = "",
+     .preset = "-1", .help = "Model generic: register of the tilt angle; -1 none."},
+    {"angle_format", SETTING_ENUM, FIELD(angle_format), .unit = "", .choices = modbus_formats,
+     .preset = "s16", .help = "Model generic: how the angle is written."},
+    {"angle_scale", SETTING_DOUBLE, FIELD(angle_scale), .least = -1000, .most = 1000, .unit = "deg",
+     .preset = "0.01", .help = "Model generic: angle per count; negative turns its sign."},
+    {"angle_offset", SETTING_DOUBLE, FIELD(angle_offset), .least = -4294967296.0,
+     .most = 4294967296.0, .unit = "", .preset = "0",
+     .help = "Model generic: counts added to the angle before scaling."},
+    {"word_order", SETTING_ENUM, FIELD(word_order), .unit = "", .choices = modbus_word_orders,
+     .preset = "high-first", .help = "Model generic: order of the two registers of 32 bits."},
+    {"sentinel", SETTING_DOUBLE, FIELD(sentinel), .least = ACCELEROMETER_NO_SENTINEL,
+     .most = 4294967295.0, .unit = "", .preset = "-4294967296",
+     .help = "Model generic: counts by which the sensor says that it has no reading; the preset is "
+             "none."},
     {0},
 };
 
@@ -27,4 +62,33 @@ const struct accelerometer_driver *const accelerometer_drivers[] = {&witmotion_d
 double tilt_of_gravity(struct vec3 gravity)
 {
     return atan2(gravity.y, gravity.z) * (180 / M_PI);
+}
+
+double tilt_wrap(double deg)
+{
+    return deg - 360 * rint(deg / 360);
+}
+
+const char *tilt_doubt_text(enum tilt_doubt doubt)
+{
+    switch (doubt) {
+#define X(name, text)                                                                              \
+    case TILT_##name:                                                                              \
+        return text;
+        TILT_DOUBTS(X)
+#undef X
+    }
+    return "";
+}
+
+void tilt_judge(struct tilt_sample *s, bool has_gravity)
+{
+    bool weighs = !has_gravity || fabs(vec3_length(s->gravity) - gravity_m_s2) <= gravity_slack;
+    bool agrees = !has_gravity || isnan(s->angle_deg) ||
+                  fabs(tilt_wrap(s->tilt_deg - s->angle_deg)) <= agreement_deg;
+    s->doubt = !isfinite(s->tilt_deg) ? TILT_NO_READING
+               : !weighs              ? TILT_GRAVITY
+               : !agrees              ? TILT_DISAGREE
+                                      : TILT_NONE;
+    s->plausible = s->doubt == TILT_NONE;
 }

@@ -19,13 +19,25 @@ enum {
     MOST_FAILURES = 5,
 };
 
-static const double standard_gravity = 9.80665; // m/s2
-static const double gravity = 9.81, gravity_slack = 0.3;
-static const double agreement_deg = 2;
+#define G_STEP (16.0 / 32768 * 9.80665) // m/s2
 
-static const struct witmotion_map maps[] = {
-    {"wt901c485", 3, 0x34, 12, 0x34, 16.0 / 32768, 0x3d, 1, 180.0 / 32768, 0x2e, 0x7f},
-    {"hwt9073", 3, 0x34, 15, 0x34, 16.0 / 32768, 0x3d, 2, 0.001, 0x2e, 0x7f},
+static const struct modbus_map maps[] = {
+    {"wt901c485",
+     3,
+     true,
+     {0x34, 3, MODBUS_S16, false, G_STEP, 0, NAN},
+     {0x3d, 3, MODBUS_S16, false, 180.0 / 32768, 0, NAN},
+     {1, 2, 3},
+     0x2e,
+     0x7f},
+    {"hwt9073",
+     3,
+     true,
+     {0x34, 3, MODBUS_S16, false, G_STEP, 0, NAN},
+     {0x3d, 3, MODBUS_S32, true, 0.001, 0, NAN},
+     {1, 2, 3},
+     0x2e,
+     0x7f},
 };
 
 const struct device_id witmotion_ids[] = {
@@ -37,41 +49,45 @@ const struct device_id witmotion_ids[] = {
 
 struct accelerometer {
     struct accelerometer_options options;
-    const struct witmotion_map *map;
+    struct modbus_map map;
     modbus_t *modbus;
     bool connected;
-    int version;
+    char version[8];
     char serial[2 * SERIAL_WORDS + 1];
     int failures; // reads without a sample, one after the other
 };
 
-const struct witmotion_map *witmotion_map(int model)
+const struct modbus_map *witmotion_map(int model)
 {
-    return &maps[model];
+    return model >= 0 && (size_t)model < sizeof maps / sizeof *maps ? &maps[model] : NULL;
 }
 
-double witmotion_angle(const struct witmotion_map *map, const uint16_t *registers, int which)
+int witmotion_first(const struct modbus_map *map)
 {
-    const uint16_t *r = registers + (map->angle - map->first) + which * map->words;
-    int32_t steps = map->words == 1 ? (int16_t)r[0] : (int32_t)(r[0] | (uint32_t)r[1] << 16);
-    return steps * map->deg_per_step;
+    return map->accel.first < map->angle.first ? map->accel.first : map->angle.first;
 }
 
-static double wrap(double deg)
+int witmotion_count(const struct modbus_map *map)
 {
-    return deg - 360 * rint(deg / 360);
+    int accel_end = map->accel.first + modbus_field_words(&map->accel);
+    int angle_end = map->angle.first + modbus_field_words(&map->angle);
+    return (accel_end > angle_end ? accel_end : angle_end) - witmotion_first(map);
 }
 
-void witmotion_decode(const struct witmotion_map *map, const uint16_t *registers, double offset_deg,
+double witmotion_angle(const struct modbus_map *map, const uint16_t *registers, int which)
+{
+    double deg = NAN;
+    int skip = map->angle.first - witmotion_first(map);
+    modbus_field_value(&map->angle, registers + skip, which, &deg);
+    return deg;
+}
+
+void witmotion_decode(const struct modbus_map *map, const uint16_t *registers, double offset_deg,
                       struct tilt_sample *out)
 {
-    const uint16_t *r = registers + (map->accel - map->first);
-    const double step = map->g_per_step * standard_gravity;
-    out->gravity = (struct vec3){(int16_t)r[0] * step, (int16_t)r[1] * step, (int16_t)r[2] * step};
-    out->tilt_deg = wrap(tilt_of_gravity(out->gravity) + offset_deg);
-    out->angle_deg = wrap(witmotion_angle(map, registers, 0) + offset_deg);
-    out->plausible = fabs(vec3_length(out->gravity) - gravity) <= gravity_slack &&
-                     fabs(wrap(out->tilt_deg - out->angle_deg)) <= agreement_deg;
+    int first = witmotion_first(map);
+    modbus_decode(map, registers + (map->accel.first - first),
+                  registers + (map->angle.first - first), offset_deg, out);
 }
 
 static bool fail_modbus(const struct accelerometer *a, struct error *err)
@@ -92,6 +108,13 @@ static bool fail_modbus(const struct accelerometer *a, struct error *err)
                 modbus_strerror(code));
 }
 
+// Refusals of what the map asks for, as against a sensor that is busy or ill.
+static bool asks_for_nothing(int exception)
+{
+    return exception >= MODBUS_EXCEPTION_ILLEGAL_FUNCTION &&
+           exception <= MODBUS_EXCEPTION_ILLEGAL_DATA_VALUE;
+}
+
 static bool check_reply(const struct accelerometer *a, const uint8_t *reply, int count, int words,
                         struct error *err)
 {
@@ -101,11 +124,12 @@ static bool check_reply(const struct accelerometer *a, const uint8_t *reply, int
     if (reply[0] != a->options.unit)
         return fail(err, ERROR_RETRY, "%s: unit %d answered for unit %d", port, reply[0],
                     a->options.unit);
-    if (reply[1] == (a->map->function | EXCEPTION))
-        return fail(err, ERROR_RETRY, "%s: %s", port, modbus_strerror(MODBUS_ENOBASE + reply[2]));
-    if (reply[1] != a->map->function || reply[2] != 2 * words || count < 3 + 2 * words)
+    if (reply[1] == (a->map.function | EXCEPTION))
+        return fail(err, ERROR_RETRY, "%s: %s%s", port, modbus_strerror(MODBUS_ENOBASE + reply[2]),
+                    asks_for_nothing(reply[2]) ? ": is the map right?" : "");
+    if (reply[1] != a->map.function || reply[2] != 2 * words || count < 3 + 2 * words)
         return fail(err, ERROR_RETRY, "%s: function %d with %d bytes instead of %d with %d", port,
-                    reply[1], reply[2], a->map->function, 2 * words);
+                    reply[1], reply[2], a->map.function, 2 * words);
     return true;
 }
 
@@ -126,7 +150,7 @@ static bool read_registers(struct accelerometer *a, int first, int words, uint16
 {
     uint8_t reply[MODBUS_MAX_ADU_LENGTH];
     const uint8_t request[] = {(uint8_t)a->options.unit,
-                               (uint8_t)a->map->function,
+                               (uint8_t)a->map.function,
                                first >> 8 & 255,
                                first & 255,
                                0,
@@ -215,13 +239,42 @@ static bool known_prefix(const char *serial)
     return !strncmp(serial, "EMU", 3) || !strncmp(serial, "WT", 2);
 }
 
+static bool read_field(struct accelerometer *a, const struct modbus_field *field, uint16_t *out,
+                       int64_t deadline_ns, struct error *err)
+{
+    int words = modbus_field_words(field);
+    return !words || read_registers(a, field->first, words, out, deadline_ns, err);
+}
+
+static bool read_map(struct accelerometer *a, int64_t deadline_ns, struct tilt_sample *out,
+                     struct error *err)
+{
+    uint16_t accel[MODBUS_MAP_WORDS_MOST], angle[MODBUS_MAP_WORDS_MOST];
+    const struct modbus_map *map = &a->map;
+    if (map->together) {
+        if (!read_registers(a, witmotion_first(map), witmotion_count(map), accel, deadline_ns, err))
+            return false;
+        witmotion_decode(map, accel, a->options.offset_deg, out);
+        return true;
+    }
+    if (!read_field(a, &map->accel, accel, deadline_ns, err) ||
+        !read_field(a, &map->angle, angle, deadline_ns, err))
+        return false;
+    modbus_decode(map, map->accel.first < 0 ? NULL : accel, map->angle.first < 0 ? NULL : angle,
+                  a->options.offset_deg, out);
+    return true;
+}
+
 static bool greet(struct accelerometer *a, int64_t deadline_ns, struct error *err)
 {
     uint16_t words[SERIAL_WORDS];
-    if (!read_registers(a, a->map->version, 1, words, deadline_ns, err))
+    struct tilt_sample sample;
+    if (a->map.version < 0)
+        return read_map(a, deadline_ns, &sample, err) || while_doing(err, "asking for the tilt");
+    if (!read_registers(a, a->map.version, 1, words, deadline_ns, err))
         return while_doing(err, "asking for the firmware version");
-    a->version = words[0];
-    if (!read_registers(a, a->map->serial, SERIAL_WORDS, words, deadline_ns, NULL))
+    snprintf(a->version, sizeof a->version, "%d", words[0]);
+    if (!read_registers(a, a->map.serial, SERIAL_WORDS, words, deadline_ns, NULL))
         return true;
     serial_text(words, true, a->serial);
     if (!known_prefix(a->serial)) {
@@ -252,8 +305,10 @@ static struct accelerometer *witmotion_open(const struct accelerometer_options *
         return NULL;
     }
     a->options = *options;
-    a->map = witmotion_map(options->model);
-    if (connect_bus(a, deadline_ns, err)) {
+    const struct modbus_map *row = witmotion_map(options->model);
+    if (row)
+        a->map = *row;
+    if ((row || modbus_map_generic(options, &a->map, err)) && connect_bus(a, deadline_ns, err)) {
         if (greet(a, deadline_ns, err))
             return a;
         if (err && err->code == ERROR_RETRY)
@@ -266,25 +321,25 @@ static struct accelerometer *witmotion_open(const struct accelerometer_options *
 static bool witmotion_read(struct accelerometer *a, int64_t deadline_ns, struct tilt_sample *out,
                            struct error *err)
 {
-    uint16_t registers[WITMOTION_MOST];
+    struct tilt_sample sample = {0};
     int64_t asked = clock_now_ns();
-    if (!read_registers(a, a->map->first, a->map->count, registers, deadline_ns, err)) {
+    if (!read_map(a, deadline_ns, &sample, err)) {
         if (++a->failures >= MOST_FAILURES && err)
             err->code = ERROR_GONE;
         return false;
     }
     a->failures = 0;
-    out->taken = (struct interval){asked, clock_now_ns()};
-    witmotion_decode(a->map, registers, a->options.offset_deg, out);
+    sample.taken = (struct interval){asked, clock_now_ns()};
+    *out = sample;
     return true;
 }
 
 static void witmotion_identify(const struct accelerometer *a, struct instrument_identity *out)
 {
     memset(out, 0, sizeof *out);
-    snprintf(out->model, sizeof out->model, "%s", a->map->model);
+    snprintf(out->model, sizeof out->model, "%s", a->map.model);
     snprintf(out->serial, sizeof out->serial, "%s", a->serial);
-    snprintf(out->firmware, sizeof out->firmware, "%d", a->version);
+    snprintf(out->firmware, sizeof out->firmware, "%s", a->version);
     out->emulated = !strncmp(a->serial, "EMU", 3);
 }
 

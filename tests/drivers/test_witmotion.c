@@ -68,7 +68,7 @@ static void set_pose(uint16_t *r, double deg, double g, double roll_deg)
 static void gravity_and_the_angle_register_must_agree(void **state)
 {
     (void)state;
-    const struct witmotion_map *map = witmotion_map(WT901C485);
+    const struct modbus_map *map = witmotion_map(WT901C485);
     uint16_t r[12] = {0};
     struct tilt_sample s;
     set_pose(r, 30, 1, 30);
