@@ -14,11 +14,11 @@ boothctl_in := daemon
 boothcal_in := calibration
 boothsim_in := simulator
 
-PACKAGES := git make gcc g++ libc6-dev pkg-config libusb-1.0-0-dev libudev-dev libmodbus-dev libhidapi-dev \
+PACKAGES := git make gcc g++ libc6-dev pkg-config libusb-1.0-0-dev libudev-dev libmodbus-dev libhidapi-dev libiio-dev \
   libopencv-core-dev libopencv-calib3d-dev libceres-dev libopenexr-dev libglfw3-dev libepoxy-dev \
   libegl-dev libgl1-mesa-dri libinih-dev libjansson-dev libpng-dev libmatio-dev libsystemd-dev \
   libcmocka-dev libumockdev-dev umockdev xvfb xauth systemd psychtoolbox-3-common clang-format
-PKGS := libusb-1.0 libudev libmodbus hidapi-hidraw OpenEXR glfw3 epoxy egl inih jansson libpng matio \
+PKGS := libusb-1.0 libudev libmodbus hidapi-hidraw libiio OpenEXR glfw3 epoxy egl inih jansson libpng matio \
   libsystemd cmocka umockdev-1.0
 
 OPTIMISE := -O2
@@ -34,7 +34,7 @@ ALL_CXX   = -std=c++17 -D_GNU_SOURCE $(OPTIMISE) -g -fPIC -fopenmp -Wall -Wextra
 base_libs        := -ljansson -lpthread -lm
 files_libs       := -linih -lOpenEXRCore-3_1 -lpng $(base_libs)
 colorimetry_libs := -lm
-drivers_libs     := -lusb-1.0 -lmodbus -lhidapi-hidraw -ludev -lopencv_calib3d -lopencv_core -lstdc++ -lm
+drivers_libs     := -lusb-1.0 -lmodbus -lhidapi-hidraw -liio -ludev -lopencv_calib3d -lopencv_core -lstdc++ -lm
 simulator_libs   := $(shell pkg-config --libs umockdev-1.0 2>/dev/null) -lmodbus -lutil -lm -lpthread
 simulator_test_libs := -lusb-1.0 -lhidapi-hidraw
 render_libs      := -lglfw -lepoxy -lEGL -lm

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/accelerometer.h"
 
+#include <stdlib.h>
+#include <string.h>
+
+#include "drivers/iio.h"
 #include "drivers/modbus_map.h"
 #include "drivers/witmotion.h"
 
@@ -23,6 +27,8 @@ const struct setting accelerometer_settings[] = {
      .preset = "wt901c485", .help = "Which register map the sensor has."},
     {"offset_deg", SETTING_DOUBLE, FIELD(offset_deg), .least = -180, .most = 180, .unit = "deg",
      .preset = "0", .help = "Added to the tilt, for a sensor not mounted flush."},
+    {"iio_device", SETTING_TEXT, FIELD(iio_device), SIZE(iio_device), .unit = "", .preset = "",
+     .help = "Driver iio: name or label of the accelerometer; empty takes the first one found."},
     {"function", SETTING_INT, FIELD(function), .least = 3, .most = 4, .unit = "", .preset = "3",
      .help = "Model generic: Modbus function that reads, 3 holding or 4 input registers."},
     {"accel_register", SETTING_INT, FIELD(accel_register), .least = -1, .most = 65535, .unit = "",
@@ -37,7 +43,8 @@ const struct setting accelerometer_settings[] = {
      .most = 4294967296.0, .unit = "", .preset = "0",
      .help = "Model generic: counts added to an acceleration before scaling."},
     {"accel_axes", SETTING_VECTOR, FIELD(accel_axes), 3, -3, 3, .unit = "", .preset = "1 2 3",
-     .help = "Model generic: the sensor's axes (1, 2, 3, negative when turned round) that point to "
+     .help = "Driver iio and model generic: the sensor's axes (1, 2, 3, negative when turned "
+             "round) that point to "
              "the screen's right, up and out."},
     {"angle_register", SETTING_INT, FIELD(angle_register), .least = -1, .most = 65535, .unit = "",
      .preset = "-1", .help = "Model generic: register of the tilt angle; -1 none."},
@@ -57,7 +64,8 @@ const struct setting accelerometer_settings[] = {
     {0},
 };
 
-const struct accelerometer_driver *const accelerometer_drivers[] = {&witmotion_driver, NULL};
+const struct accelerometer_driver *const accelerometer_drivers[] = {&witmotion_driver, &iio_driver,
+                                                                    NULL};
 
 double tilt_of_gravity(struct vec3 gravity)
 {
@@ -79,6 +87,31 @@ const char *tilt_doubt_text(enum tilt_doubt doubt)
 #undef X
     }
     return "";
+}
+
+bool accelerometer_axes(const double axes[3], int out[3], struct error *err)
+{
+    int whole[3], seen = 0;
+    for (int i = 0; i < 3; i++) {
+        whole[i] = fabs(axes[i]) <= 3 ? (int)axes[i] : 0;
+        if (whole[i] == axes[i] && whole[i] != 0)
+            seen |= 1 << abs(whole[i]);
+    }
+    if (seen != (1 << 1 | 1 << 2 | 1 << 3))
+        return fail(err, ERROR_CONFIG,
+                    "accel_axes: %g %g %g are not 1, 2 and 3 in some order, each with its sign",
+                    axes[0], axes[1], axes[2]);
+    memcpy(out, whole, sizeof whole);
+    return true;
+}
+
+struct vec3 accelerometer_turn(const int axes[3], struct vec3 sensor)
+{
+    const double from[] = {sensor.x, sensor.y, sensor.z};
+    double to[3];
+    for (int i = 0; i < 3; i++)
+        to[i] = axes[i] > 0 ? from[axes[i] - 1] : -from[-axes[i] - 1];
+    return (struct vec3){to[0], to[1], to[2]};
 }
 
 void tilt_judge(struct tilt_sample *s, bool has_gravity)

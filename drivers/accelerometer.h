@@ -33,12 +33,13 @@ struct tilt_sample {
 #define ACCELEROMETER_NO_SENTINEL (-4294967296.0) // no register reaches it
 
 struct accelerometer_options {
-    char port[128];    // "/dev/ttyUSB0", or "host:port" for Modbus TCP
-    int unit;          // Modbus unit id 1..247
-    int baud;          // 1200..921600
-    int model;         // index into accelerometer_models
-    double offset_deg; // added to tilt, -180..180
-    // Of the register map "generic" only; see modbus_map.h.
+    char port[128];      // "/dev/ttyUSB0", or "host:port" for Modbus TCP
+    int unit;            // Modbus unit id 1..247
+    int baud;            // 1200..921600
+    int model;           // index into accelerometer_models
+    double offset_deg;   // added to tilt, -180..180
+    char iio_device[64]; // driver iio: name, label or "iio:deviceN", "" = the first one
+    // Of the register map "generic" (accel_axes also of driver iio); see modbus_map.h.
     int function;                       // 3 or 4
     int accel_register, angle_register; // 0..65535, -1 = none
     int accel_format, angle_format;     // index into modbus_formats
@@ -73,6 +74,13 @@ double tilt_of_gravity(struct vec3 gravity);
 
 // The same angle within -180..180.
 double tilt_wrap(double deg);
+
+// accel_axes as whole numbers; CONFIG unless they are 1, 2, 3 in some order,
+// each with its sign.
+bool accelerometer_axes(const double accel_axes[3], int out[3], struct error *err);
+
+// The sensor's vector along the screen's axes.
+struct vec3 accelerometer_turn(const int axes[3], struct vec3 sensor);
 
 // Fills plausible and doubt from the rest; has_gravity is false for a sensor
 // that only knows its angle, angle_deg NAN for one that does not.

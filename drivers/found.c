@@ -142,5 +142,6 @@ void found_all(struct found_list *list, int64_t deadline_ns)
 {
     found_spectrometers(list, deadline_ns);
     found_trackers(list);
+    found_iio(list);
     found_serial_lines(list);
 }

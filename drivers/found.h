@@ -47,6 +47,7 @@ struct found_list {
 // may hang on them. Returns soon after deadline_ns even when a unit is silent.
 void found_spectrometers(struct found_list *list, int64_t deadline_ns);
 void found_trackers(struct found_list *list);
+void found_iio(struct found_list *list);
 void found_serial_lines(struct found_list *list);
 
 // All of the above.

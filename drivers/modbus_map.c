@@ -2,7 +2,6 @@
 #include "drivers/modbus_map.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 const char *const modbus_formats[] = {"s16", "u16", "s32", "u32", "float", NULL};
@@ -52,15 +51,11 @@ bool modbus_field_value(const struct modbus_field *field, const uint16_t *regist
 
 static bool gravity_of(const struct modbus_map *map, const uint16_t *registers, struct vec3 *out)
 {
-    double sensor[3], screen[3];
+    double v[3];
     for (int i = 0; i < 3; i++)
-        if (!modbus_field_value(&map->accel, registers, i, &sensor[i]))
+        if (!modbus_field_value(&map->accel, registers, i, &v[i]))
             return false;
-    for (int i = 0; i < 3; i++) {
-        int axis = map->axes[i];
-        screen[i] = axis > 0 ? sensor[axis - 1] : -sensor[-axis - 1];
-    }
-    *out = (struct vec3){screen[0], screen[1], screen[2]};
+    *out = accelerometer_turn(map->axes, (struct vec3){v[0], v[1], v[2]});
     return true;
 }
 
@@ -80,20 +75,6 @@ void modbus_decode(const struct modbus_map *map, const uint16_t *accel, const ui
     else
         *out =
             (struct tilt_sample){.taken = out->taken, .angle_deg = NAN, .doubt = TILT_NO_READING};
-}
-
-static bool check_axes(const double axes[3], int out[3], struct error *err)
-{
-    int seen = 0;
-    for (int i = 0; i < 3; i++) {
-        out[i] = (int)axes[i];
-        if (out[i] == axes[i] && out[i] != 0)
-            seen |= 1 << abs(out[i]);
-    }
-    return seen == 0xe || fail(err, ERROR_CONFIG,
-                               "accel_axes: %g %g %g are not 1, 2 and 3 in some "
-                               "order, each with its sign",
-                               axes[0], axes[1], axes[2]);
 }
 
 static bool check_field(const char *name, const struct modbus_field *field, struct error *err)
@@ -120,7 +101,7 @@ bool modbus_map_generic(const struct accelerometer_options *o, struct modbus_map
     if (map.accel.first < 0 && map.angle.first < 0)
         return fail(err, ERROR_CONFIG,
                     "model generic needs accel_register, angle_register or both");
-    if (!check_axes(o->accel_axes, map.axes, err) ||
+    if (!accelerometer_axes(o->accel_axes, map.axes, err) ||
         !check_field("accel_register", &map.accel, err) ||
         !check_field("angle_register", &map.angle, err))
         return false;
