@@ -180,7 +180,7 @@ int command_list(int argc, char **argv)
             return COMMAND_USAGE;
         }
     if (optind < argc || (udev && (json || config)))
-        return command_bad_usage("%s", USAGE);
+        return command_bad_usage("usage: boothcal list [--config FILE] [--json] | --udev");
     if (!udev)
         return show(config, json);
     udev_rules_print(stdout);

@@ -9,6 +9,7 @@
 static const char *const output_names[] = {"auto", "window", "offscreen", NULL};
 static const char *const spectral_names[] = {"auto", "bands", "product", "full", NULL};
 static const char *const cut_names[] = {"variance", "energy", NULL};
+static const char *const eye_filter_names[] = {"none", "one-euro", "kalman", NULL};
 static const char *const bits_names[] = {"8", "10", NULL};
 static const char *const observer_names[] = {
 #define X(name, text) text,
@@ -121,7 +122,17 @@ static const struct setting state_rows[] = {
     {"tilt_s", SETTING_DOUBLE, AT(state.tilt_s), 0, 0, 10, "s", NULL, "0.2",
      "Time constant over which a resting tilt is smoothed."},
     {"eye_s", SETTING_DOUBLE, AT(state.eye_s), 0, 0, 10, "s", NULL, "0.1",
-     "Time constant over which the place of a resting eye is smoothed."},
+     "Time constant over which the place of a resting eye is smoothed (one-euro)."},
+    {"eye_filter", SETTING_ENUM, AT(state.eye_filter), 0, 0, 0, "", eye_filter_names, "one-euro",
+     "How the place of the eye is smoothed: steadiest at rest (one-euro), or nearest while it "
+     "moves "
+     "(kalman)."},
+    {"eye_noise_m", SETTING_DOUBLE, AT(state.eye_noise_m), 0, 0.0001, 0.1, "m", NULL, "0.005",
+     "Noise of one place as the tracker sees it (kalman)."},
+    {"eye_acceleration", SETTING_DOUBLE, AT(state.eye_acceleration), 0, 0.01, 100, "m/s2", NULL,
+     "8", "How hard a head accelerates, from one sample to the next (kalman)."},
+    {"eye_ahead_s", SETTING_DOUBLE, AT(state.eye_ahead_s), 0, 0, 0.05, "s", NULL, "0.03",
+     "From a frame's start to its light, over which the place of the eye is predicted; 0: not."},
     {"dark_lux", SETTING_DOUBLE, AT(state.dark_lux), 0, 0, 1000, "lx", NULL, "5",
      "Illuminance below which no lamp is on."},
     {"lamp_distance", SETTING_DOUBLE, AT(state.lamp_distance), 0, 0.001, 1, "", NULL, "0.01",

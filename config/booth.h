@@ -19,6 +19,9 @@ enum booth_output {
     OUTPUT_OFFSCREEN, // never a window
 };
 
+// How the place of the eye is smoothed.
+enum eye_filter { EYE_FILTER_NONE, EYE_FILTER_ONE_EURO, EYE_FILTER_KALMAN };
+
 // How long what an instrument said is believed when it says nothing more.
 struct state_settings {
     double lamp_hold_s;   // 0..3600: lamp and level
@@ -26,7 +29,11 @@ struct state_settings {
     double eye_hold_s;    // 0..3600
     double level_s;       // 0..60: time constant of the lamp's level
     double tilt_s;        // 0..10: time constant of the tilt
-    double eye_s;         // 0..10: time constant of the eye
+    int eye_filter;       // enum eye_filter
+    double eye_s;         // 0..10: time constant of the resting eye, one-euro
+    double eye_noise_m;   // 0.0001..0.1: of one place seen, kalman
+    double eye_acceleration; // 0.01..100 m/s2: of a head, kalman
+    double eye_ahead_s;   // 0..0.05: from a frame's start to its light; 0 = the eye as last seen
     double dark_lux;      // 0..1000: below it no lamp is on
     double lamp_distance; // 0.001..1: greatest shape distance of a known lamp
     int confirmations;    // 1..20: equal readings before another lamp is believed

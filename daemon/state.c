@@ -10,8 +10,6 @@ static const double LEVEL_STEP = 0.03; // a dimmer's, far above a reading's nois
 static const int LEVEL_STEP_READINGS = 2;
 static const double TILT_STEP_DEG = 0.3; // a hand's, far above a resting sensor's noise
 static const double EYE_FARTHEST_M = 10;
-static const double EYE_LAG_M = 0.05;   // at any speed
-static const double EYE_SPEED_S = 0.16; // 1 Hz, as the filter's authors recommend
 
 const char *standing_name(enum standing standing)
 {
@@ -185,24 +183,9 @@ static void take_tilt(struct estimator *e, const struct samples *seen, int64_t n
     remember(&e->tilt, &t->taken, now_ns, 1);
 }
 
-static double share_of(double dt_s, double time_constant_s)
+static int64_t middle(const struct interval *taken)
 {
-    return time_constant_s > 0 ? -expm1(-dt_s / time_constant_s) : 1;
-}
-
-static struct vec3 towards(struct vec3 from, struct vec3 to, double share)
-{
-    return vec3_add(from, vec3_scale(vec3_sub(to, from), share));
-}
-
-static void follow_eye(struct estimator *e, struct vec3 at, double dt_s)
-{
-    double rest_s = e->limits.eye_s;
-    struct vec3 *smooth = &e->state.eye.at;
-    struct vec3 speed = vec3_scale(vec3_sub(at, *smooth), 1 / dt_s);
-    e->eye_speed = towards(e->eye_speed, speed, share_of(dt_s, EYE_SPEED_S));
-    double faster = vec3_length(e->eye_speed) * rest_s / EYE_LAG_M;
-    *smooth = towards(*smooth, at, share_of(dt_s, rest_s / (1 + faster)));
+    return taken->earliest_ns + (taken->latest_ns - taken->earliest_ns) / 2;
 }
 
 static void take_head(struct estimator *e, const struct samples *seen, int64_t now_ns)
@@ -216,13 +199,7 @@ static void take_head(struct estimator *e, const struct samples *seen, int64_t n
         e->eye.usable = false;
         return;
     }
-    double dt_s = seconds(h->taken.latest_ns - e->eye.seen_ns);
-    if (e->eye.ever && dt_s < e->limits.eye_hold_s) {
-        follow_eye(e, at, fmax(dt_s, 0.001));
-    } else {
-        e->state.eye.at = at;
-        e->eye_speed = (struct vec3){0};
-    }
+    eye_take(&e->track, &e->limits, at, middle(&h->taken));
     double px = isfinite(h->reprojection_px) ? h->reprojection_px : INFINITY;
     remember(&e->eye, &h->taken, now_ns, 1 / (1 + px * px));
 }
@@ -257,6 +234,9 @@ struct state estimate(struct estimator *e, const struct samples *seen, int64_t n
     take_spectrum(e, seen, now_ns);
     take_tilt(e, seen, now_ns);
     take_head(e, seen, now_ns);
+    if (e->track.known)
+        e->state.eye.at =
+            eye_at(&e->track, &e->limits, now_ns + (int64_t)(e->limits.eye_ahead_s * NS_PER_S));
     e->state.lamp.belief = believe(&e->lamp, e->limits.lamp_hold_s, now_ns);
     e->state.tilt.belief = believe(&e->tilt, e->limits.tilt_hold_s, now_ns);
     e->state.eye.belief = believe(&e->eye, e->limits.eye_hold_s, now_ns);

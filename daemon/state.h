@@ -7,6 +7,7 @@
 
 #include "colorimetry/classifier.h"
 #include "config/booth.h"
+#include "daemon/eye.h"
 
 // The newest sample of each instrument and its running number (base/mailbox.h);
 // 0 = none yet.
@@ -52,7 +53,7 @@ struct state {
     } tilt;
     struct {
         struct belief belief;
-        struct vec3 at; // booth frame, m
+        struct vec3 at; // booth frame, m, when the light of a frame drawn now leaves the screen
     } eye;
 };
 
@@ -72,9 +73,9 @@ struct estimator {
     int64_t now_ns; // of the last call
     struct memory lamp, tilt, eye;
     struct state state;
-    struct vec3 eye_speed; // m/s, smoothed
-    int level_readings;    // of the lamp now on
-    int level_steps;       // readings in a row beyond LEVEL_STEP on one side, signed
+    struct eye_track track;
+    int level_readings; // of the lamp now on
+    int level_steps;    // readings in a row beyond LEVEL_STEP on one side, signed
 };
 
 // taught may hold no lamp; its limits come from settings.
@@ -97,8 +98,7 @@ void estimator_change(struct estimator *e, const struct booth_settings *settings
 //   and count at once.
 // - Tilt: smoothed over tilt_s while within 0.3 degrees, else taken at once;
 //   implausible samples are passed over.
-// - Eye: smoothed over eye_s at rest, the less the faster it moves, so that it
-//   lags by 5 cm at most (Casiez, Roussel, Vogel 2012, the 1 Euro filter); lost
+// - Eye: smoothed and carried on to the time of the frame's light (eye.h); lost
 //   or ambiguous markers keep the last place.
 // Samples older than one already used are passed over. When now_ns goes back,
 // ages start again from 0.
