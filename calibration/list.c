@@ -104,16 +104,17 @@ static void blame(struct found *f, const struct error *err)
 }
 
 // Opens the instrument that the settings say hangs on a line, and lets it tell
-// its name.
-#define ASK(kind)                                                                                  \
+// its name. elsewhere is the place of one without a port; NULL: it was found already.
+#define ASK(kind, elsewhere)                                                                       \
     static void ask_##kind(const struct booth_settings *booth, struct found_list *list)            \
     {                                                                                              \
         const struct kind##_driver *driver = booth_##kind(booth);                                  \
         struct error err = {0};                                                                    \
         struct instrument_identity who = {0};                                                      \
-        if (!driver)                                                                               \
+        const char *place = driver && driver->portless ? elsewhere : booth->kind.options.port;     \
+        if (!driver || !place)                                                                     \
             return;                                                                                \
-        struct found *f = entry_for(list, #kind, driver->name, booth->kind.options.port);          \
+        struct found *f = entry_for(list, #kind, driver->name, place);                             \
         if (!f || f->access == FOUND_REFUSED)                                                      \
             return;                                                                                \
         struct kind *device =                                                                      \
@@ -126,8 +127,8 @@ static void blame(struct found *f, const struct error *err)
         name(f, &who);                                                                             \
         driver->close(device);                                                                     \
     }
-ASK(accelerometer)
-ASK(radiometer)
+ASK(accelerometer, NULL)
+ASK(radiometer, booth->radiometer.options.program)
 
 static int show(const char *config, bool json)
 {

@@ -129,7 +129,7 @@ void booth_describe(FILE *out);
 // Writes the same rows as a list for boothd.conf(5), in roff.
 void booth_describe_man(FILE *out);
 
-// NULL when the settings say "none" (or name no port).
+// NULL when the settings say "none" (or name no port for a driver that needs one).
 const struct spectrometer_driver *booth_spectrometer(const struct booth_settings *booth);
 const struct accelerometer_driver *booth_accelerometer(const struct booth_settings *booth);
 const struct tracker_driver *booth_tracker(const struct booth_settings *booth);

@@ -193,8 +193,10 @@ const struct spectrometer_driver *booth_spectrometer(const struct booth_settings
 
 const struct accelerometer_driver *booth_accelerometer(const struct booth_settings *b)
 {
-    bool there = b->accelerometer.driver && *b->accelerometer.options.port;
-    return there ? accelerometer_drivers[b->accelerometer.driver - 1] : NULL;
+    const struct accelerometer_driver *driver =
+        b->accelerometer.driver ? accelerometer_drivers[b->accelerometer.driver - 1] : NULL;
+    bool there = driver && (driver->portless || *b->accelerometer.options.port);
+    return there ? driver : NULL;
 }
 
 const struct tracker_driver *booth_tracker(const struct booth_settings *b)
@@ -204,8 +206,10 @@ const struct tracker_driver *booth_tracker(const struct booth_settings *b)
 
 const struct radiometer_driver *booth_radiometer(const struct booth_settings *b)
 {
-    bool there = b->radiometer.driver && *b->radiometer.options.port;
-    return there ? radiometer_drivers[b->radiometer.driver - 1] : NULL;
+    const struct radiometer_driver *driver =
+        b->radiometer.driver ? radiometer_drivers[b->radiometer.driver - 1] : NULL;
+    bool there = driver && (driver->portless || *b->radiometer.options.port);
+    return there ? driver : NULL;
 }
 
 bool booth_bands(const struct booth_settings *booth, struct band_set *out, struct error *err)

@@ -55,7 +55,7 @@ extern const char *const accelerometer_models[]; // "wt901c485", "hwt9073", "gen
 
 struct accelerometer;
 
-// As spectrometer_driver, each function alike.
+// As spectrometer_driver, each function alike. Records: "witmotion", "iio".
 struct accelerometer_driver {
     const char *name;
     struct accelerometer *(*open)(const struct accelerometer_options *options, int64_t deadline_ns,
@@ -64,6 +64,7 @@ struct accelerometer_driver {
                  struct error *err);
     void (*identify)(const struct accelerometer *device, struct instrument_identity *out);
     void (*close)(struct accelerometer *device);
+    bool portless; // it needs no options->port
 };
 
 extern const struct accelerometer_driver *const accelerometer_drivers[];

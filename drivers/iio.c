@@ -297,4 +297,5 @@ void found_iio(struct found_list *list)
         iio_context_destroy(context);
 }
 
-const struct accelerometer_driver iio_driver = {"iio", iio_open, iio_read, iio_identify, iio_close};
+const struct accelerometer_driver iio_driver = {"iio",        iio_open,  iio_read,
+                                                iio_identify, iio_close, true};

@@ -342,4 +342,4 @@ static void pr655_identify(const struct radiometer *r, struct instrument_identit
 }
 
 const struct radiometer_driver pr655_driver = {"pr655", pr655_open, pr655_read, pr655_identify,
-                                               pr655_close};
+                                               pr655_close, false};

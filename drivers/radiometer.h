@@ -8,16 +8,20 @@
 
 struct radiance_sample {
     struct interval taken;
-    struct xyz xyz;            // as the instrument computed it, 1931 2 degrees, cd/m2
-    double first_nm, step_nm;  // of raw
-    int count;                 // 0..401
-    double raw[401];           // W m-2 sr-1 nm-1 as sent
-    struct spectrum radiance;  // on the inner grid
+    struct xyz xyz;           // as the instrument computed it, 1931 2 degrees, cd/m2
+    double first_nm, step_nm; // of raw
+    int count;                // 0..401; 0 from a colorimeter, then radiance is 0
+    double raw[401];          // W m-2 sr-1 nm-1 as sent
+    struct spectrum radiance; // on the inner grid
 };
 
 struct radiometer_options {
     char port[128]; // serial line, "" = none
     int average;    // readings per sample, 1..99
+    // spotread only:
+    char program[128];   // name or path
+    char arguments[256]; // more options, separated by blanks
+    bool calibrate;      // the instrument lies on its calibration position when opened
 };
 
 extern const struct setting radiometer_settings[];
@@ -25,7 +29,7 @@ extern const struct setting radiometer_settings[];
 struct radiometer;
 
 struct radiometer_driver {
-    const char *name; // "pr655"
+    const char *name; // "pr655", "spotread"
     struct radiometer *(*open)(const struct radiometer_options *options, int64_t deadline_ns,
                                struct error *err);
     // RETRY for weak or unstable light and time-outs; RANGE for overload; the
@@ -34,6 +38,7 @@ struct radiometer_driver {
                  struct error *err);
     void (*identify)(const struct radiometer *device, struct instrument_identity *out);
     void (*close)(struct radiometer *device);
+    bool portless; // it needs no options->port
 };
 
 extern const struct radiometer_driver *const radiometer_drivers[];

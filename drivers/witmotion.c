@@ -343,5 +343,5 @@ static void witmotion_identify(const struct accelerometer *a, struct instrument_
     out->emulated = !strncmp(a->serial, "EMU", 3);
 }
 
-const struct accelerometer_driver witmotion_driver = {"witmotion", witmotion_open, witmotion_read,
-                                                      witmotion_identify, witmotion_close};
+const struct accelerometer_driver witmotion_driver = {
+    "witmotion", witmotion_open, witmotion_read, witmotion_identify, witmotion_close, false};

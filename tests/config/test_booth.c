@@ -55,6 +55,20 @@ static void what_must_be_given_suffices(void **state)
     assert_null(booth_radiometer(&b)); // no port is given
 }
 
+static void some_drivers_need_no_port(void **state)
+{
+    (void)state;
+    struct booth_settings b;
+    struct error err = {0};
+    assert_true(load(NEEDED "[radiometer]\ndriver = spotread\n"
+                            "[accelerometer]\ndriver = iio\nport =\n",
+                     &b, &err));
+    assert_string_equal(booth_radiometer(&b)->name, "spotread");
+    assert_string_equal(booth_accelerometer(&b)->name, "iio");
+    assert_true(load(NEEDED "[accelerometer]\nport =\n", &b, &err));
+    assert_null(booth_accelerometer(&b));
+}
+
 static void every_bad_line_is_named(void **state)
 {
     (void)state;
@@ -291,6 +305,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_must_be_given_suffices),
+        cmocka_unit_test(some_drivers_need_no_port),
         cmocka_unit_test(every_bad_line_is_named),
         cmocka_unit_test(a_file_that_is_not_there_is_named),
         cmocka_unit_test(paths_are_relative_to_the_file),
