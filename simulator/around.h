@@ -4,6 +4,7 @@
 #ifndef SIMULATOR_AROUND_H
 #define SIMULATOR_AROUND_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "base/linear.h"
@@ -19,12 +20,14 @@ struct around {
     // Gravity in the inclinometer's axes (x right, y up along the screen, z
     // out of it), m/s2: (0, 0, 9.81) when the screen lies flat face up.
     struct vec3 (*gravity)(void *context, int64_t at_ns);
-    // Places of the three infrared markers of the clip in the camera's frame:
-    // z out of the lens, y up, x = y cross z; metres. Order: top, middle, bottom.
+    // Places of the three infrared markers of clip or cap in the camera's frame:
+    // z out of the lens, y up, x = y cross z; metres. Order as head.h has it.
     void (*markers)(void *context, int64_t at_ns, struct vec3 out[3]);
     // Spectral radiance (W m-2 sr-1 nm-1) from the place the radiometer is
     // aimed at, averaged over its spot, at this moment.
     void (*radiance)(void *context, int64_t at_ns, struct spectrum *out);
+    // Place of a fourth marker, as markers; false = there is none. May be NULL.
+    bool (*fourth_marker)(void *context, int64_t at_ns, struct vec3 *out);
 };
 
 #endif

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulator/head.h"
 
-static const struct vec3 clip[3] = {{0, 0.040, -0.030}, {0, 0, 0}, {0, -0.070, -0.080}};
+static const struct vec3 models[2][3] = {
+    [HEAD_CLIP] = {{0, 0.040, -0.030}, {0, 0, 0}, {0, -0.070, -0.080}},
+    [HEAD_CAP] = {{0, 0, 0}, {-0.040, -0.060, -0.100}, {0.040, -0.060, -0.100}},
+};
 
 static double limited(double angle, double most_deg)
 {
@@ -17,14 +20,31 @@ struct mat3 head_turn(const struct scenario_head *head, struct vec3 eye, struct 
     return mat3_mul(mat3_rotation(1, aside), mat3_rotation(0, -down));
 }
 
+static struct vec3 on_head(const struct scenario_head *head, const struct mat3 *turn,
+                           struct vec3 eye, struct vec3 marker)
+{
+    const double *c = head->clip_from_eye_m;
+    struct vec3 origin = {c[0], c[1], c[2]};
+    return vec3_add(eye, mat3_apply(*turn, vec3_add(origin, marker)));
+}
+
 void head_markers(const struct scenario_head *head, struct vec3 eye, struct vec3 at,
                   struct vec3 out[3])
 {
     struct mat3 turn = head_turn(head, eye, at);
-    const double *c = head->clip_from_eye_m;
-    struct vec3 origin = {c[0], c[1], c[2]};
     for (int i = 0; i < 3; i++)
-        out[i] = vec3_add(eye, mat3_apply(turn, vec3_add(origin, clip[i])));
+        out[i] = on_head(head, &turn, eye, models[head->markers][i]);
+}
+
+bool head_fourth_marker(const struct scenario_head *head, struct vec3 eye, struct vec3 at,
+                        struct vec3 *out)
+{
+    if (!head->fourth)
+        return false;
+    struct mat3 turn = head_turn(head, eye, at);
+    struct vec3 marker = {head->fourth_m[0], head->fourth_m[1], head->fourth_m[2]};
+    *out = on_head(head, &turn, eye, marker);
+    return true;
 }
 
 struct rigid camera_pose(const struct scenario_camera *camera)

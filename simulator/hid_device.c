@@ -13,6 +13,7 @@
 #include "simulator/wire_fault.h"
 
 enum { REPORTS = 64 }; // as the kernel's hidraw keeps for a reader
+enum { FLOOD_TIMES = 50, OTHER_REPORT = 0x3D };
 
 struct report {
     uint8_t bytes[HID_REPORT_MOST];
@@ -24,7 +25,6 @@ struct hid_device_emulated {
     int number;              // of the HID device, 1 at the first plug
     char hid_path[128], hidraw_path[192];
     struct hid_model model;
-    int clients;
     struct report queue[REPORTS];
     int queued;
     UMockdevIoctlClient *reader; // waits in a blocking read
@@ -51,10 +51,10 @@ static void give(UMockdevIoctlClient *client, const struct report *report)
     umockdev_ioctl_client_complete(client, (glong)size, 0);
 }
 
-static void queue(struct hid_device_emulated *d, struct report report)
+static void queue_once(struct hid_device_emulated *d, struct report report)
 {
     report.size = fault_on(d->wire.fault, &d->wire.noise, report.bytes, report.size);
-    if (report.size == 0 || d->clients == 0)
+    if (report.size == 0 || d->wire.clients.count == 0)
         return;
     if (d->reader) {
         give(d->reader, &report);
@@ -66,6 +66,15 @@ static void queue(struct hid_device_emulated *d, struct report report)
     d->queue[d->queued++] = report;
     if (d->queued == 1)
         node_set_readable(&d->wire.node, true);
+}
+
+static void queue(struct hid_device_emulated *d, struct report report)
+{
+    if (d->wire.fault == WIRE_WRONG_REPORT)
+        report.bytes[0] = OTHER_REPORT;
+    int times = d->wire.fault == WIRE_FLOOD ? FLOOD_TIMES : 1;
+    for (int i = 0; i < times; i++)
+        queue_once(d, report);
 }
 
 static int64_t pump(void *owner)
@@ -89,7 +98,7 @@ static gboolean on_read(UMockdevIoctlBase *handler, UMockdevIoctlClient *client,
     (void)handler;
     struct hid_device_emulated *d = data;
     waiter_lock(&d->wire.waiter);
-    if (!d->wire.plugged) {
+    if (!clients_have(&d->wire.clients, client)) {
         umockdev_ioctl_client_complete(client, -1, EIO);
     } else if (d->queued > 0) {
         struct report report = take(d);
@@ -109,7 +118,7 @@ static gboolean on_write(UMockdevIoctlBase *handler, UMockdevIoctlClient *client
     size_t size = (size_t)arg->data_len;
     waiter_lock(&d->wire.waiter);
     int status = -ENODEV;
-    if (d->wire.plugged)
+    if (clients_have(&d->wire.clients, client))
         status = d->model.out(d->model.context, clock_now_ns(), arg->data, size);
     waiter_wake(&d->wire.waiter);
     waiter_unlock(&d->wire.waiter);
@@ -135,10 +144,12 @@ static int put_descriptor(const struct hid_model *m, UMockdevIoctlData *arg)
     return result < 0 ? result : 0;
 }
 
-static int answer(struct hid_device_emulated *d, gulong request, UMockdevIoctlData *arg)
+static int answer(struct hid_device_emulated *d, UMockdevIoctlClient *client)
 {
+    gulong request = umockdev_ioctl_client_get_request(client);
+    UMockdevIoctlData *arg = umockdev_ioctl_client_get_arg(client);
     const struct hid_model *m = &d->model;
-    if (!d->wire.plugged)
+    if (!clients_have(&d->wire.clients, client))
         return -ENODEV;
     if (request == HIDIOCGRDESCSIZE) {
         int size = (int)m->descriptor_size;
@@ -165,20 +176,10 @@ static gboolean on_ioctl(UMockdevIoctlBase *handler, UMockdevIoctlClient *client
     (void)handler;
     struct hid_device_emulated *d = data;
     waiter_lock(&d->wire.waiter);
-    int result =
-        answer(d, umockdev_ioctl_client_get_request(client), umockdev_ioctl_client_get_arg(client));
+    int result = answer(d, client);
     waiter_unlock(&d->wire.waiter);
     umockdev_ioctl_client_complete(client, result < 0 ? -1 : result, result < 0 ? -result : 0);
     return TRUE;
-}
-
-static void on_connected(UMockdevIoctlBase *handler, UMockdevIoctlClient *client, gpointer data)
-{
-    (void)handler, (void)client;
-    struct hid_device_emulated *d = data;
-    waiter_lock(&d->wire.waiter);
-    d->clients++;
-    waiter_unlock(&d->wire.waiter);
 }
 
 static void on_vanished(UMockdevIoctlBase *handler, UMockdevIoctlClient *client, gpointer data)
@@ -188,8 +189,8 @@ static void on_vanished(UMockdevIoctlBase *handler, UMockdevIoctlClient *client,
     waiter_lock(&d->wire.waiter);
     if (d->reader == client)
         d->reader = NULL;
-    d->clients--;
-    while (d->clients == 0 && d->queued > 0)
+    clients_remove(&d->wire.clients, client);
+    while (d->wire.clients.count == 0 && d->queued > 0)
         take(d);
     waiter_unlock(&d->wire.waiter);
 }
@@ -250,18 +251,6 @@ static void remove_from_sysfs(struct hid_device_emulated *d, const char *path)
     umockdev_testbed_remove_device(d->wire.testbed, sys);
 }
 
-// umockdev 0.17 leaves this link behind, and the next terminal may get the
-// same number.
-static void remove_number_link(struct hid_device_emulated *d)
-{
-    char link[256];
-    char *root = umockdev_testbed_get_root_dir(d->wire.testbed);
-    snprintf(link, sizeof(link), "%s/sys/dev/char/%d:%d", root, d->wire.node.major_number,
-             d->wire.node.minor_number);
-    g_free(root);
-    unlink(link);
-}
-
 static bool show(struct hid_device_emulated *d, struct error *err)
 {
     if (!add(d, describe_hid, err) || !add(d, describe_hidraw, err) ||
@@ -304,6 +293,7 @@ void hid_unplug(struct hid_device_emulated *device)
         return;
     waiter_lock(&d->wire.waiter);
     d->wire.plugged = false;
+    d->wire.clients.count = 0;
     d->queued = 0;
     if (d->reader)
         umockdev_ioctl_client_complete(d->reader, -1, EIO);
@@ -311,7 +301,7 @@ void hid_unplug(struct hid_device_emulated *device)
     waiter_unlock(&d->wire.waiter);
     remove_from_sysfs(d, d->hidraw_path);
     remove_from_sysfs(d, d->hid_path);
-    remove_number_link(d);
+    node_forget_number(d->wire.testbed, d->wire.node.major_number, d->wire.node.minor_number);
     wire_device_hide(&d->wire);
 }
 
@@ -328,7 +318,6 @@ struct hid_device_emulated *hid_emulate(UMockdevTestbed *testbed, const struct h
     g_signal_connect(d->wire.handler, "handle-ioctl", G_CALLBACK(on_ioctl), d);
     g_signal_connect(d->wire.handler, "handle-read", G_CALLBACK(on_read), d);
     g_signal_connect(d->wire.handler, "handle-write", G_CALLBACK(on_write), d);
-    g_signal_connect(d->wire.handler, "client-connected", G_CALLBACK(on_connected), d);
     g_signal_connect(d->wire.handler, "client-vanished", G_CALLBACK(on_vanished), d);
     if (started)
         return d;
@@ -340,6 +329,8 @@ void hid_set_fault(struct hid_device_emulated *device, enum wire_fault fault)
 {
     waiter_lock(&device->wire.waiter);
     device->wire.fault = fault;
+    if (device->wire.plugged)
+        node_forbid(&device->wire.node, fault == WIRE_FORBIDDEN);
     waiter_unlock(&device->wire.waiter);
 }
 

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#define FULL_SCALE 65535.0      // of the scaled axis
+#define FULL_SCALE 65535.0      // of the axis that the constants below are on
 #define WELL_ELECTRONS 160000.0 // at full scale
 #define READ_NOISE 50.0         // scaled counts rms
 #define LINE_FWHM_NM 1.5
@@ -25,11 +25,16 @@ struct pixel {
     double weight[BINS]; // W m-2 nm-1 in a 1 nm bin -> counts per second
     double dark;        // counts per second
     double pattern;     // raw
+    double lit;         // part of the light it gets
+    double restless;    // times the read noise
 };
 
 struct detector {
     struct detector_options options;
-    struct pixel pixels[DETECTOR_PIXELS];
+    enum detector_kind_of_pixel kinds[DETECTOR_PIXELS_MOST];
+    struct pixel pixels[DETECTOR_PIXELS_MOST];
+    int count;
+    double unit; // counts per count of the axis to FULL_SCALE
     double measured_of_light[INVERSE_STEPS + 2];
     double wander_phase;
 };
@@ -60,7 +65,7 @@ static void set_weights(const struct detector *d, double p, struct pixel *pixel)
     const double *c = d->options.wavelength;
     double nm = polynomial(c, 4, p);
     double width = c[1] + p * (2 * c[2] + p * 3 * c[3]);
-    double gain = d->options.collector_mm2 * width / detector_calibration(nm);
+    double gain = d->unit * d->options.collector_mm2 * width / detector_calibration(nm);
     double sigma = LINE_FWHM_NM / 2.354820045;
     int first = (int)lround(nm) - BINS / 2;
     pixel->first = first - SPECTRUM_FIRST_NM;
@@ -75,11 +80,11 @@ static void set_inverse(struct detector *d)
 {
     const double *c = d->options.nonlinearity;
     for (int i = 0; i < INVERSE_STEPS + 2; i++) {
-        double light = INVERSE_END * i / INVERSE_STEPS;
-        double low = 0, high = 2 * INVERSE_END;
+        double light = d->unit * INVERSE_END * i / INVERSE_STEPS;
+        double low = 0, high = 2 * d->unit * INVERSE_END;
         for (int step = 0; step < 60; step++) {
             double middle = (low + high) / 2;
-            if (middle < light * polynomial(c, 8, fmin(middle, FULL_SCALE)))
+            if (middle < light * polynomial(c, 8, fmin(middle, d->options.full)))
                 low = middle;
             else
                 high = middle;
@@ -90,11 +95,46 @@ static void set_inverse(struct detector *d)
 
 static double measured(const struct detector *d, double light)
 {
-    double at = fmin(fmax(light, 0), INVERSE_END) * (INVERSE_STEPS / INVERSE_END);
+    double end = d->unit * INVERSE_END;
+    double at = fmin(fmax(light, 0), end) * (INVERSE_STEPS / end);
     int i = (int)at;
     const double *t = d->measured_of_light;
     double m = t[i] + (at - i) * (t[i + 1] - t[i]);
     return light < 0 ? light * d->options.nonlinearity[0] : m;
+}
+
+// Partly covered pixels get from 0.3 to 0.7 of the light.
+static void set_pixel(struct detector *d, int p, const struct detector_zone *zone, int first,
+                      struct noise *noise)
+{
+    struct pixel *pixel = &d->pixels[p];
+    d->kinds[p] = zone->kind;
+    pixel->restless = zone->kind == DETECTOR_UNUSABLE ? 8 : 1;
+    if (zone->kind != DETECTOR_ACTIVE && zone->kind != DETECTOR_TRANSITION)
+        return;
+    double across = zone->last > first ? (double)(p - first) / (zone->last - first) : 0;
+    pixel->lit = zone->kind == DETECTOR_ACTIVE ? 1 : 0.3 + 0.4 * across;
+    set_weights(d, p, pixel);
+    pixel->dark = d->unit * DARK_PER_S * (0.5 + noise_even(noise));
+    pixel->pattern = PATTERN_RAW * noise_normal(noise);
+}
+
+static void set_pixels(struct detector *d, struct noise *noise)
+{
+    int active_first = 0, active_count = 0;
+    for (const struct detector_zone *z = d->options.zones; z->kind; z++) {
+        int first = d->count;
+        for (; d->count <= z->last; d->count++)
+            set_pixel(d, d->count, z, first, noise);
+        if (z->kind == DETECTOR_ACTIVE) {
+            active_first = first;
+            active_count = d->count - first;
+        }
+    }
+    for (int i = 0; i < HOT_PIXELS; i++) {
+        int p = active_first + (int)(noise_bits(noise) % (uint64_t)active_count);
+        d->pixels[p].dark += d->unit * (300 + 1500 * noise_even(noise));
+    }
 }
 
 struct detector *detector_create(const struct detector_options *options)
@@ -103,18 +143,10 @@ struct detector *detector_create(const struct detector_options *options)
     if (!d)
         return NULL;
     d->options = *options;
+    d->unit = options->full / FULL_SCALE;
     struct noise noise;
     noise_init(&noise, options->seed, 'd');
-    for (int p = DETECTOR_FIRST_TRANSITION; p < DETECTOR_PIXELS; p++) {
-        struct pixel *pixel = &d->pixels[p];
-        set_weights(d, p, pixel);
-        pixel->dark = DARK_PER_S * (0.5 + noise_even(&noise));
-        pixel->pattern = PATTERN_RAW * noise_normal(&noise);
-    }
-    for (int i = 0; i < HOT_PIXELS; i++) {
-        int p = DETECTOR_FIRST_ACTIVE + (int)(noise_bits(&noise) % 2000);
-        d->pixels[p].dark += 300 + 1500 * noise_even(&noise);
-    }
+    set_pixels(d, &noise);
     d->wander_phase = 2 * M_PI * noise_even(&noise);
     set_inverse(d);
     return d;
@@ -147,28 +179,34 @@ static uint16_t converted(const struct detector *d, double raw)
     return (uint16_t)fmin(fmax(lround(raw), 0), d->options.saturation);
 }
 
-void detector_expose(const struct detector *d, const struct spectrum *irradiance,
-                     double exposure_s, double age_s, struct noise *noise,
-                     uint16_t raw[DETECTOR_PIXELS])
+// The counts that light has made of one pixel, before reading.
+static double exposed(const struct detector *d, const struct pixel *pixel, double light,
+                      double exposure_s, struct noise *noise)
 {
-    double light[DETECTOR_PIXELS] = {0}, mean = 0;
-    for (int p = DETECTOR_FIRST_TRANSITION; p < DETECTOR_PIXELS; p++) {
-        light[p] = exposure_s * light_of(&d->pixels[p], irradiance);
-        mean += light[p] / DETECTOR_PIXELS;
-    }
-    light[DETECTOR_FIRST_TRANSITION] *= 0.3;
-    light[DETECTOR_FIRST_TRANSITION + 1] *= 0.7;
+    double counts = light + pixel->dark * exposure_s;
+    counts += noise_normal(noise) * sqrt(counts * (d->options.full / WELL_ELECTRONS));
+    return measured(d, counts);
+}
 
-    double raw_per_count = d->options.saturation / FULL_SCALE;
+void detector_expose(const struct detector *d, const struct spectrum *irradiance,
+                     double exposure_s, double age_s, struct noise *noise, uint16_t *raw)
+{
+    double light[DETECTOR_PIXELS_MOST] = {0}, mean = 0;
+    for (int p = 0; p < d->count; p++) {
+        if (d->pixels[p].lit > 0)
+            light[p] = exposure_s * light_of(&d->pixels[p], irradiance);
+        mean += light[p] / d->count;
+    }
+    double raw_per_count = d->options.saturation / d->options.full;
     double zero = baseline(d, age_s);
-    for (int p = 0; p < DETECTOR_PIXELS; p++) {
+    for (int p = 0; p < d->count; p++) {
+        const struct pixel *pixel = &d->pixels[p];
         double counts = 0;
-        if (p >= DETECTOR_FIRST_TRANSITION) {
-            counts = light[p] + STRAY * mean + d->pixels[p].dark * exposure_s;
-            counts += noise_normal(noise) * sqrt(counts * (FULL_SCALE / WELL_ELECTRONS));
-            counts = measured(d, counts);
-        }
-        counts += READ_NOISE * noise_normal(noise);
-        raw[p] = converted(d, zero + d->pixels[p].pattern + counts * raw_per_count);
+        if (pixel->lit > 0)
+            counts = exposed(d, pixel, pixel->lit * light[p] + STRAY * mean, exposure_s, noise);
+        counts += d->unit * READ_NOISE * pixel->restless * noise_normal(noise);
+        raw[p] = d->kinds[p] == DETECTOR_FILLER
+                     ? 0
+                     : converted(d, zero + pixel->pattern + counts * raw_per_count);
     }
 }

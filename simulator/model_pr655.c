@@ -47,6 +47,8 @@ enum { LINE_MOST = 64, OUT_MOST = 8192, BANDPASS_NM = 8, SAMPLES = 16 };
 #define READ_ELECTRONS 20.0
 #define REPEAT_ALL 0.001      // relative, common to all points of a reading
 #define REPEAT_POINT 0.0005   // relative, each point by itself
+#define DRIFT 0.01            // relative, a reading
+#define MISREAD 0.10          // relative
 #define EXPOSURE_LEAST_MS 3.0
 #define EXPOSURE_MOST_MS 6000.0
 #define OVERHEAD_MS 300.0     // shutter, dark reading, arithmetic
@@ -58,6 +60,8 @@ struct pr655 {
     char serial[32];
     bool remote, echo;
     int upset;
+    enum pr655_lie lie;
+    int lies; // readings since
 
     char line[LINE_MOST];
     size_t line_size;
@@ -100,6 +104,21 @@ void pr655_destroy(struct pr655 *device)
 void pr655_upset(struct pr655 *device, int status)
 {
     device->upset = status;
+}
+
+void pr655_lie(struct pr655 *device, enum pr655_lie lie)
+{
+    if (device->lie != lie)
+        device->lies = 0;
+    device->lie = lie;
+}
+
+static double lie_about(struct pr655 *d)
+{
+    int told = d->lies++;
+    if (d->lie == PR655_DRIFTING)
+        return pow(1 + DRIFT, told + 1);
+    return d->lie == PR655_MISREADING && told % 3 == 0 ? 1 + MISREAD : 1;
 }
 
 __attribute__((format(printf, 2, 3))) static void say(struct pr655 *d, const char *format, ...)
@@ -185,7 +204,7 @@ static int finish_exposure(struct pr655 *d)
 
     double electrons_per_radiance = fill_per_radiance * WELL_ELECTRONS * d->averages;
     double read2 = READ_ELECTRONS * READ_ELECTRONS * d->averages;
-    double common = 1 + REPEAT_ALL * noise_normal(&d->noise);
+    double common = (1 + REPEAT_ALL * noise_normal(&d->noise)) * lie_about(d);
     for (int i = 0; i < PR655_POINTS; i++) {
         double electrons = mean[i] * electrons_per_radiance;
         electrons += sqrt(electrons + read2) * noise_normal(&d->noise);

@@ -33,4 +33,10 @@ size_t pr655_out(struct pr655 *device, int64_t now_ns, char *out, size_t size, i
 // From now on measurements end with this status (such as -1); 0 = as they are.
 void pr655_upset(struct pr655 *device, int status);
 
+enum pr655_lie { PR655_TRUTHFUL, PR655_DRIFTING, PR655_MISREADING };
+
+// DRIFTING: each reading from now on is 1 % above the one before. MISREADING:
+// every third one, the first included, is 10 % too high.
+void pr655_lie(struct pr655 *device, enum pr655_lie lie);
+
 #endif

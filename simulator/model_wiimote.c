@@ -36,11 +36,14 @@ enum input {
     IN_ACCEL_EXTENSION = 0x35,
     IN_IR10_EXTENSION = 0x36,
     IN_ACCEL_IR10_EXTENSION = 0x37,
+    IN_INTERLEAVED_FIRST = 0x3E,
+    IN_INTERLEAVED_SECOND = 0x3F,
 };
 
 enum { RUMBLE = 0x01, ASK_ACK = 0x02, ON = 0x04 };
 enum { ACK_OK = 0, ACK_ABSENT = 7, ACK_BAD = 8 };
-enum { CAMERA_BASIC = 1, CAMERA_EXTENDED = 3 };
+enum { CAMERA_BASIC = 1, CAMERA_EXTENDED = 3, CAMERA_FULL = 5 };
+enum { PIXEL_SUBS = 8 }; // steps of a blob's place in one pixel of the sensor
 enum { MARKERS = 3, BLOBS = 4, QUEUE = 16, CAMERA_REGISTERS = 0x34, MEMORY_SIZE = 0x1700 };
 enum { SENSOR_WIDTH = 1024, SENSOR_HEIGHT = 768 };
 
@@ -82,7 +85,7 @@ struct wiimote {
     struct noise noise;
     char serial[64];
     uint8_t leds, mode;
-    bool continuous, clock, logic, reporting;
+    bool continuous, clock, logic, reporting, second_half;
     uint8_t camera[CAMERA_REGISTERS];
     uint8_t memory[MEMORY_SIZE];
     struct report queue[QUEUE];
@@ -231,9 +234,14 @@ static size_t payload_of(uint8_t id)
     }
 }
 
+static bool interleaved(uint8_t mode)
+{
+    return mode == IN_INTERLEAVED_FIRST || mode == IN_INTERLEAVED_SECOND;
+}
+
 static bool known_mode(uint8_t mode)
 {
-    return mode >= IN_BUTTONS && mode <= IN_ACCEL_IR10_EXTENSION;
+    return (mode >= IN_BUTTONS && mode <= IN_ACCEL_IR10_EXTENSION) || interleaved(mode);
 }
 
 static void set_mode(struct wiimote *d, const uint8_t *report)
@@ -242,6 +250,7 @@ static void set_mode(struct wiimote *d, const uint8_t *report)
         return;
     d->continuous = report[1] & ON;
     d->mode = report[2];
+    d->second_half = false;
     d->reporting = true;
     d->last.size = 0;
 }
@@ -315,25 +324,56 @@ static void look(struct wiimote *d, int64_t now_ns, struct blob blobs[BLOBS])
         blobs[i].x = -1;
     if (!camera_sees(d))
         return;
-    struct vec3 markers[MARKERS];
-    d->options.around.markers(d->options.around.context, now_ns, markers);
-    int seen = 0;
-    for (int i = 0; i < MARKERS; i++) {
+    struct vec3 markers[MARKERS + 1];
+    const struct around *around = &d->options.around;
+    around->markers(around->context, now_ns, markers);
+    int seen = 0, count = MARKERS;
+    if (around->fourth_marker && around->fourth_marker(around->context, now_ns, &markers[MARKERS]))
+        count++;
+    for (int i = 0; i < count; i++) {
         struct blob blob = project(d, markers[i]);
         if (blob.x >= 0)
             blobs[seen++] = blob;
     }
 }
 
+static void put_three(const struct blob *b, uint8_t out[3])
+{
+    out[0] = b->x & 0xFF;
+    out[1] = b->y & 0xFF;
+    out[2] = (uint8_t)((b->y >> 8) << 6 | (b->x >> 8) << 4 | b->size);
+}
+
 static void put_extended(const struct blob blobs[BLOBS], uint8_t out[12])
 {
-    for (int i = 0; i < BLOBS; i++) {
+    for (int i = 0; i < BLOBS; i++)
+        if (blobs[i].x >= 0)
+            put_three(&blobs[i], out + 3 * i);
+}
+
+static uint8_t edge(int at, int most)
+{
+    int pixel = at < 0 ? 0 : at / PIXEL_SUBS;
+    return (uint8_t)(pixel < most ? pixel : most);
+}
+
+// Two blobs: place and size, the box around each in pixels of the sensor, and
+// its brightness.
+static void put_full(const struct blob blobs[2], uint8_t out[18])
+{
+    for (int i = 0; i < 2; i++) {
         const struct blob *b = &blobs[i];
+        uint8_t *at = out + 9 * i;
+        int reach = b->size * PIXEL_SUBS / 2;
         if (b->x < 0)
             continue;
-        out[3 * i] = b->x & 0xFF;
-        out[3 * i + 1] = b->y & 0xFF;
-        out[3 * i + 2] = (uint8_t)((b->y >> 8) << 6 | (b->x >> 8) << 4 | b->size);
+        put_three(b, at);
+        at[3] = edge(b->x - reach, SENSOR_WIDTH / PIXEL_SUBS - 1);
+        at[4] = edge(b->y - reach, SENSOR_HEIGHT / PIXEL_SUBS - 1);
+        at[5] = edge(b->x + reach, SENSOR_WIDTH / PIXEL_SUBS - 1);
+        at[6] = edge(b->y + reach, SENSOR_HEIGHT / PIXEL_SUBS - 1);
+        at[7] = 0;
+        at[8] = (uint8_t)(b->size * 16);
     }
 }
 
@@ -385,6 +425,25 @@ static bool has_accel(uint8_t mode)
            mode == IN_ACCEL_IR10_EXTENSION;
 }
 
+// Half of the camera's data and two thirds of the acceleration in each of two
+// reports that take turns; z is spread over the spare bits of the buttons.
+static void compose_interleaved(struct wiimote *d, const struct blob blobs[BLOBS],
+                                struct report *out)
+{
+    bool second = d->second_half;
+    uint8_t accel[3], *at = out->bytes;
+    put_accel(d, accel);
+    d->second_half = !second;
+    at[0] = second ? IN_INTERLEAVED_SECOND : IN_INTERLEAVED_FIRST;
+    int shift = second ? 0 : 4;
+    at[1] |= (uint8_t)((accel[2] >> shift & 3) << 5);
+    at[2] |= (uint8_t)((accel[2] >> (shift + 2) & 3) << 5);
+    at[3] = second ? accel[1] : accel[0];
+    memset(at + 4, 0xFF, 18);
+    if (d->camera[CAMERA_MODE] == CAMERA_FULL)
+        put_full(blobs + (second ? 2 : 0), at + 4);
+}
+
 // Blob data of the wrong format for the report do not get through.
 static void compose(struct wiimote *d, int64_t now_ns, struct report *out)
 {
@@ -392,6 +451,10 @@ static void compose(struct wiimote *d, int64_t now_ns, struct report *out)
     look(d, now_ns, blobs);
     *out = (struct report){{d->mode}, size_of(d->mode)};
     uint8_t *at = out->bytes + 3;
+    if (interleaved(d->mode)) {
+        compose_interleaved(d, blobs, out);
+        return;
+    }
     if (has_accel(d->mode))
         at = put_accel(d, at);
     if (d->mode == IN_ACCEL_IR12) {

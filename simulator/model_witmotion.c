@@ -18,9 +18,9 @@ enum address {
     GYRO = 0x37,
     MAG = 0x3A,
     ROLL = 0x3D,
-    PITCH = 0x3E,
-    YAW = 0x3F,
     TEMPERATURE = 0x40,
+    PRECISE_ROLL = 0x3D,
+    PRECISE_TEMPERATURE = 0x43,
     QUATERNION = 0x51,
     KEY = 0x69,
     NUMBER = 0x7F,
@@ -30,6 +30,7 @@ enum { KEY_OPEN = 0xB588, BAUD_9600 = 2, RATE_10_HZ = 6 };
 
 #define STANDARD_G 9.80665
 #define ANGLE_NOISE_DEG 0.02
+#define PRECISE_NOISE_DEG 0.005
 #define ACC_NOISE_G (ANGLE_NOISE_DEG * (M_PI / 180))
 #define UNLOCKED_NS (10 * NS_PER_S)
 
@@ -45,10 +46,10 @@ static uint16_t angle_word(double degrees)
     return (uint16_t)(int16_t)((long)round(wrapped / 180 * 32768) & 0xFFFF);
 }
 
-void witmotion_init(struct witmotion *device, const struct around *around, const char *serial,
-                    uint64_t seed, int64_t now_ns)
+void witmotion_init(struct witmotion *device, enum witmotion_map map, const struct around *around,
+                    const char *serial, uint64_t seed, int64_t now_ns)
 {
-    *device = (struct witmotion){.around = *around, .powered_ns = now_ns};
+    *device = (struct witmotion){.map = map, .around = *around, .powered_ns = now_ns};
     noise_init(&device->noise, seed, 'i');
     uint16_t *r = device->registers;
     r[RATE] = RATE_10_HZ;
@@ -61,12 +62,25 @@ void witmotion_init(struct witmotion *device, const struct around *around, const
     witmotion_refresh(device, now_ns);
 }
 
+static void put_precise(uint16_t words[2], double degrees)
+{
+    uint32_t value = (uint32_t)(int32_t)lround(1000 * remainder(degrees, 360));
+    words[0] = value & 0xFFFF;
+    words[1] = (uint16_t)(value >> 16);
+}
+
 static void set_angles(struct witmotion *d, double roll, double pitch)
 {
     uint16_t *r = d->registers;
-    r[ROLL] = angle_word(roll + ANGLE_NOISE_DEG * noise_normal(&d->noise));
-    r[PITCH] = angle_word(pitch + ANGLE_NOISE_DEG * noise_normal(&d->noise));
-    r[YAW] = angle_word(3 * ANGLE_NOISE_DEG * noise_normal(&d->noise));
+    double noise_deg = d->map == WITMOTION_PRECISE ? PRECISE_NOISE_DEG : ANGLE_NOISE_DEG;
+    double angles[3] = {roll, pitch, 0};
+    for (int i = 0; i < 3; i++) {
+        double noisy = angles[i] + (i == 2 ? 3 : 1) * noise_deg * noise_normal(&d->noise);
+        if (d->map == WITMOTION_PRECISE)
+            put_precise(r + PRECISE_ROLL + 2 * i, noisy);
+        else
+            r[ROLL + i] = angle_word(noisy);
+    }
     double half_roll = roll * (M_PI / 360), half_pitch = pitch * (M_PI / 360);
     double q[4] = {cos(half_roll) * cos(half_pitch), sin(half_roll) * cos(half_pitch),
                    cos(half_roll) * sin(half_pitch), -sin(half_roll) * sin(half_pitch)};
@@ -89,7 +103,7 @@ void witmotion_refresh(struct witmotion *device, int64_t now_ns)
     double pitch = atan2(-g[0], hypot(g[1], g[2])) * (180 / M_PI);
     set_angles(device, roll, pitch);
     double age_s = (double)(now_ns - device->powered_ns) * 1e-9;
-    r[TEMPERATURE] = word(100 * (25 + 4 * (1 - exp(-age_s / 300))));
+    r[device->map == WITMOTION_PRECISE ? PRECISE_TEMPERATURE : TEMPERATURE] = word(100 * (25 + 4 * (1 - exp(-age_s / 300))));
 }
 
 void witmotion_write(struct witmotion *device, uint16_t address, uint16_t value, int64_t now_ns)

@@ -5,6 +5,8 @@
 #include <string.h>
 
 #include "files/ini.h"
+#include "simulator/model_ooi_kind.h"
+#include "simulator/model_witmotion.h"
 
 #define DOUBLE(f, lo, hi, unit, preset, help)                                                      \
     {                                                                                              \
@@ -80,11 +82,17 @@ static const struct setting ceiling_rows[] = {
 };
 #undef OWNER
 #define OWNER scenario_head
+static const char *const worn[] = {"clip", "cap", NULL};
 static const struct setting head_rows[] = {
     VECTOR(eye_m, 3, -5, 5, "m", "0 0.55 0.65", "Midpoint of the eyes, booth frame."),
     VECTOR(clip_from_eye_m, 3, -1, 1, "m", "0 0.06 0.02",
            "Origin of the marker clip from there, when the head faces along -z."),
     DOUBLE(turn_most_deg, 0, 60, "deg", "10", "How far the head turns to face the screen."),
+    {"markers", SETTING_ENUM, offsetof(struct OWNER, markers), 0, 0, 0, "", worn, "clip",
+     "Which three markers the head wears."},
+    BOOL(fourth, "no", "Whether it wears a fourth one."),
+    VECTOR(fourth_m, 3, -1, 1, "m", "0.06 0.03 -0.02",
+           "Its place from the origin of clip or cap: x to the right, y up, z into the head."),
     {0},
 };
 #undef OWNER
@@ -113,13 +121,28 @@ static const struct setting panel_rows[] = {
 };
 #undef OWNER
 #define OWNER scenario_spectrometer
+static const char *const spectrometers[] = {
+#define X(name, text) text,
+    OOI_KINDS(X)
+#undef X
+        NULL};
 static const struct setting spectrometer_rows[] = {
     VECTOR(place_m, 3, -5, 5, "m", "0.30 0.05 0.05",
            "Place of the cosine corrector, which looks straight up whatever the tilt."),
     DOUBLE(collector_mm2, 0.01, 1000, "mm2", "11.95", "Area of the cosine corrector."),
     DOUBLE(calibration_error, -0.5, 0.5, "", "0",
            "Relative slope error over 180 nm of the calibration handed over."),
+    {"model", SETTING_ENUM, offsetof(struct OWNER, model), 0, 0, 0, "", spectrometers,
+     "usb2000plus", "Which spectrometer it is."},
     TEXT(serial, "EMU2P0001", "Serial number."),
+    {0},
+};
+#undef OWNER
+#define OWNER scenario_spectrometer_2
+static const struct setting spectrometer_2_rows[] = {
+    {"model", SETTING_ENUM, offsetof(struct OWNER, model), 0, 0, 0, "", spectrometers,
+     "usb2000plus", "Which spectrometer the second one is."},
+    TEXT(serial, "", "Its serial number; empty = there is no second one."),
     {0},
 };
 #undef OWNER
@@ -132,11 +155,22 @@ static const struct setting radiometer_rows[] = {
     {0},
 };
 #undef OWNER
-#define OWNER scenario_serial
+#define OWNER scenario_inclinometer
+static const char *const inclinometers[] = {
+#define X(name, text) text,
+    WITMOTION_MAPS(X)
+#undef X
+        NULL};
 static const struct setting inclinometer_rows[] = {
+    {"model", SETTING_ENUM, offsetof(struct OWNER, model), 0, 0, 0, "", inclinometers, "wt901c",
+     "Which inclinometer it is: angles of 16 bits, or of 32."},
+    BOOL(tcp, "no", "Modbus TCP at 127.0.0.1 instead of RTU on a line."),
+    INT(port, 0, 65535, "", "0", "Its TCP port; 0 = any, told in the file inclinometer.port."),
     TEXT(serial, "EMUWT901", "Serial number."),
     {0},
 };
+#undef OWNER
+#define OWNER scenario_serial
 static const struct setting tracker_rows[] = {
     TEXT(serial, "EMUWIIMOTE", "Serial number."),
     {0},
@@ -163,7 +197,7 @@ static const struct setting lamp_rows[] = {
 };
 #undef OWNER
 
-enum { SECTIONS = 11, SECTIONS_ALL = SECTIONS + SCENARIO_LAMPS_MOST + 1 };
+enum { SECTIONS = 12, SECTIONS_ALL = SECTIONS + SCENARIO_LAMPS_MOST + 1 };
 
 static const char *const lamp_sections[SCENARIO_LAMPS_MOST] = {"lamp1", "lamp2", "lamp3",
                                                                "lamp4", "lamp5", "lamp6"};
@@ -179,6 +213,7 @@ static void sections_of(struct scenario *s, struct settings_section out[SECTIONS
         {"camera", camera_rows, &s->camera},
         {"panel", panel_rows, &s->panel},
         {"spectrometer", spectrometer_rows, &s->spectrometer},
+        {"spectrometer2", spectrometer_2_rows, &s->spectrometer_2},
         {"radiometer", radiometer_rows, &s->radiometer},
         {"inclinometer", inclinometer_rows, &s->inclinometer},
         {"tracker", tracker_rows, &s->tracker},
@@ -250,7 +285,11 @@ static bool check(const struct scenario *s, struct error *err)
     if (s->panel.black_cdm2 >= s->panel.white_cdm2)
         return fail(err, ERROR_CONFIG, "[panel] black_cdm2: %g is not below white_cdm2 %g",
                     s->panel.black_cdm2, s->panel.white_cdm2);
+    const char *second = s->spectrometer_2.serial;
+    if (*second && !strcmp(second, s->spectrometer.serial))
+        return fail(err, ERROR_CONFIG, "[spectrometer2] serial: \"%s\" is the first one's", second);
     return check_serial("spectrometer", s->spectrometer.serial, err) &&
+           (!*second || check_serial("spectrometer2", second, err)) &&
            check_serial("radiometer", s->radiometer.serial, err) &&
            check_serial("inclinometer", s->inclinometer.serial, err) &&
            check_serial("tracker", s->tracker.serial, err);

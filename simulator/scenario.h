@@ -41,10 +41,15 @@ struct scenario_ceiling {
     double map_scale_error; // greatest; each lamp has its own
 };
 
+enum head_markers_worn { HEAD_CLIP, HEAD_CAP };
+
 struct scenario_head {
     double eye_m[3];
     double clip_from_eye_m[3]; // when the head faces straight at the booth
     double turn_most_deg;
+    int markers;        // enum head_markers_worn
+    bool fourth;        // a fourth marker is worn
+    double fourth_m[3]; // its place in the marker frame
 };
 
 struct scenario_camera {
@@ -62,6 +67,20 @@ struct scenario_spectrometer {
     double place_m[3]; // of the cosine corrector, which looks straight up
     double collector_mm2;
     double calibration_error;
+    int model; // enum ooi_name
+    char serial[SCENARIO_NAME_SIZE];
+};
+
+// Beside the first, of the same collector. A serial of "" means that there is none.
+struct scenario_spectrometer_2 {
+    int model;
+    char serial[SCENARIO_NAME_SIZE];
+};
+
+struct scenario_inclinometer {
+    int model;     // enum witmotion_map
+    bool tcp;
+    int port;      // 0 = any that is free
     char serial[SCENARIO_NAME_SIZE];
 };
 
@@ -103,7 +122,9 @@ struct scenario {
     struct scenario_panel panel;
     struct scenario_spectrometer spectrometer;
     struct scenario_radiometer radiometer;
-    struct scenario_serial inclinometer, tracker;
+    struct scenario_spectrometer_2 spectrometer_2;
+    struct scenario_inclinometer inclinometer;
+    struct scenario_serial tracker;
     struct scenario_lamp lamps[SCENARIO_LAMPS_MOST];
     char path[SCENARIO_PATH_SIZE]; // of the file; "" = made by hand
 };

@@ -16,7 +16,7 @@ static const char *const instruments[] = {
         NULL};
 
 static const char *const faults[] = {
-#define X(name, text) text,
+#define X(name, text, wires) text,
     WIRE_FAULTS(X)
 #undef X
         NULL};
@@ -99,10 +99,20 @@ bool event_aim(const struct scenario *scenario, const struct aim *aim, struct ev
 
 static bool unknown(const char *what, const char *name, const char *const *names, struct error *err)
 {
-    char list[128] = "";
+    char list[384] = "";
     for (int i = 0; names[i]; i++)
         snprintf(list + strlen(list), sizeof list - strlen(list), "%s%s", i ? ", " : "", names[i]);
     return fail(err, ERROR_RANGE, "%s: \"%s\" is not one of: %s", what, name, list);
+}
+
+static bool unknown_fault(int instrument, const char *kind, struct error *err)
+{
+    enum { FAULTS = sizeof(faults) / sizeof(faults[0]) };
+    const char *suiting[FAULTS] = {0};
+    for (int i = 0, count = 0; faults[i]; i++)
+        if (wire_fault_suits((enum wire_instrument)instrument, (enum wire_fault)i))
+            suiting[count++] = faults[i];
+    return unknown("fault", kind, suiting, err);
 }
 
 bool event_fault(const char *instrument, const char *kind, struct event *out, struct error *err)
@@ -110,8 +120,8 @@ bool event_fault(const char *instrument, const char *kind, struct event *out, st
     int which = index_of(instruments, instrument), how = index_of(faults, kind);
     if (which < 0)
         return unknown("instrument", instrument, instruments, err);
-    if (how < 0)
-        return unknown("fault", kind, faults, err);
+    if (how < 0 || !wire_fault_suits((enum wire_instrument)which, (enum wire_fault)how))
+        return unknown_fault(which, kind, err);
     *out = (struct event){.kind = EVENT_FAULT, .instrument = which, .fault = how};
     return true;
 }

@@ -8,12 +8,12 @@
 #include <sys/ioctl.h>
 
 #include "base/clock.h"
+#include "simulator/usb_place.h"
 #include "simulator/wire_device.h"
 #include "simulator/wire_fault.h"
 
-enum { URBS = 64, FIRST_NUMBER = 2, SETUP_SIZE = 8, DESCRIPTOR_DEVICE = 18 };
-
-#define SYSFS "/sys/devices/usb1/1-1"
+enum { URBS = 64, SETUP_SIZE = 8 };
+enum { FULL_PACKETS_TO_PULL = 2 };
 
 struct urb {
     UMockdevIoctlData *data, *buffer; // struct usbdevfs_urb; what it points to
@@ -31,10 +31,12 @@ struct urbs {
 };
 
 struct usb_device {
-    struct wire_device wire; // its lock guards what follows the number
-    int number;
+    struct wire_device wire; // its lock guards what follows shown
+    struct usb_place place;
+    bool shown; // in the testbed
     struct usb_model model;
     struct urbs pending, done;
+    int full_packets; // since the fault was set
     bool stall_armed;
     uint32_t halted; // bit n: IN endpoint n stalled by a fault
 };
@@ -99,6 +101,23 @@ static void drain(struct usb_device *d, uint8_t endpoint, int64_t now_ns)
         continue;
 }
 
+// The plug comes out: the host's requests end, the testbed is told by unplug.
+static void come_off(struct usb_device *d)
+{
+    d->wire.plugged = false;
+    d->wire.clients.count = 0;
+    while (d->pending.count > 0)
+        finish(d, 0, -ESHUTDOWN);
+    d->model.unplugged(d->model.context, clock_now_ns());
+}
+
+static int tear(struct usb_device *d)
+{
+    d->wire.torn = true;
+    waiter_wake(&d->wire.waiter);
+    return -ESHUTDOWN;
+}
+
 // One packet as the fault lets it through; -EAGAIN when nothing arrives.
 static int next_packet(struct usb_device *d, uint8_t endpoint, int64_t now_ns,
                        uint8_t packet[USB_PACKET_MOST], int64_t *again_ns)
@@ -115,8 +134,13 @@ static int next_packet(struct usb_device *d, uint8_t endpoint, int64_t now_ns,
         drain(d, endpoint, now_ns);
         return -EPIPE;
     }
-    if (d->wire.fault == WIRE_SHORT || d->wire.fault == WIRE_SILENT)
+    d->full_packets += (size_t)size == packet_size(d);
+    if (d->wire.fault == WIRE_PULLED_IN_SPECTRUM && d->full_packets >= FULL_PACKETS_TO_PULL)
+        return tear(d);
+    if (d->wire.fault == WIRE_SHORT || d->wire.fault == WIRE_SILENT || d->wire.fault == WIRE_OVERFLOW)
         drain(d, endpoint, now_ns);
+    if (d->wire.fault == WIRE_OVERFLOW)
+        return -EOVERFLOW;
     size = (int)fault_on(d->wire.fault, &d->wire.noise, packet, (size_t)size);
     return size == 0 && d->wire.fault == WIRE_SILENT ? -EAGAIN : size;
 }
@@ -147,51 +171,28 @@ static int transfer_in(struct usb_device *d, struct urb *urb, int64_t now_ns, in
 static int transfer_out(struct usb_device *d, struct urb *urb, int64_t now_ns)
 {
     const uint8_t *bytes = urb->buffer ? urb->buffer->data : NULL;
+    if (d->wire.fault == WIRE_PULLED_IN_COMMAND)
+        return tear(d);
     int status = d->model.out(d->model.context, urb->endpoint, now_ns, bytes, urb->length);
     urb->actual = status == 0 ? urb->length : 0;
     return status;
 }
 
-static size_t string_descriptor(const struct usb_device *d, int index, uint8_t *out)
-{
-    const char *text = index == 0 ? "" : index < 4 ? d->model.strings[index] : NULL;
-    if (!text)
-        return 0;
-    size_t size = 2;
-    for (; *text && size < 254; text++, size += 2) {
-        out[size] = (uint8_t)*text;
-        out[size + 1] = 0;
-    }
-    if (index == 0) { // the one language: US English
-        out[2] = 0x09;
-        out[3] = 0x04;
-        size = 4;
-    }
-    out[0] = (uint8_t)size;
-    out[1] = 3;
-    return size;
-}
-
 static int transfer_control(struct usb_device *d, struct urb *urb)
 {
+    enum { FROM_DEVICE = 0x80, GET_DESCRIPTOR = 6 };
     const uint8_t *setup = urb->buffer ? urb->buffer->data : NULL;
-    uint8_t text[256];
-    if (!setup || urb->length < SETUP_SIZE || setup[0] != 0x80 || setup[1] != 6)
+    uint8_t descriptor[USB_DESCRIPTOR_MOST];
+    if (!setup || urb->length < SETUP_SIZE || setup[0] != FROM_DEVICE ||
+        setup[1] != GET_DESCRIPTOR)
         return -EPIPE;
-    const uint8_t *from = NULL;
-    size_t size = 0, wanted = (size_t)setup[6] | (size_t)setup[7] << 8;
-    if (setup[3] == 1 || setup[3] == 2) {
-        from = d->model.descriptors + (setup[3] == 2 ? DESCRIPTOR_DEVICE : 0);
-        size = setup[3] == 2 ? d->model.descriptors_size - DESCRIPTOR_DEVICE : DESCRIPTOR_DEVICE;
-    } else if (setup[3] == 3) {
-        size = string_descriptor(d, setup[2], text);
-        from = text;
-    }
+    size_t size = usb_descriptor(&d->model, setup[3], setup[2], descriptor);
+    size_t wanted = (size_t)setup[6] | (size_t)setup[7] << 8;
     if (size == 0)
         return -EPIPE;
     size = size < wanted ? size : wanted;
     size = size < urb->length - SETUP_SIZE ? size : urb->length - SETUP_SIZE;
-    memcpy(urb->received, from, size);
+    memcpy(urb->received, descriptor, size);
     urb->actual = size;
     return 0;
 }
@@ -214,7 +215,7 @@ static int64_t pump(void *owner)
     struct usb_device *d = owner;
     int64_t now_ns = clock_now_ns(), again_ns = INT64_MAX;
     bool busy[256] = {false};
-    for (int i = 0; i < d->pending.count;) {
+    for (int i = 0; !d->wire.torn && i < d->pending.count;) {
         struct urb *urb = &d->pending.items[i];
         int64_t this_ns = INT64_MAX;
         int status = busy[urb->endpoint] ? 1 : transfer(d, urb, now_ns, &this_ns);
@@ -226,6 +227,8 @@ static int64_t pump(void *owner)
             finish(d, i, status);
         }
     }
+    if (d->wire.torn && d->wire.plugged)
+        come_off(d);
     return again_ns;
 }
 
@@ -245,8 +248,8 @@ static int submit(struct usb_device *d, UMockdevIoctlClient *client, UMockdevIoc
     urb.endpoint = u->endpoint;
     urb.length = u->buffer_length > 0 ? (size_t)u->buffer_length : 0;
     if (urb.length)
-        urb.buffer = umockdev_ioctl_data_resolve(urb.data, offsetof(struct usbdevfs_urb, buffer),
-                                                 urb.length, NULL);
+        urb.buffer = umockdev_ioctl_data_resolve(
+            urb.data, offsetof(struct usbdevfs_urb, buffer), urb.length, NULL);
     urb.received = malloc(urb.length + 1);
     if ((urb.length && !urb.buffer) || !urb.received) {
         drop(&urb);
@@ -262,7 +265,7 @@ static int reap(struct usb_device *d, UMockdevIoctlClient *client, UMockdevIoctl
 {
     int at = find(&d->done, client, 0);
     if (at < 0)
-        return d->wire.plugged ? -EAGAIN : -ENODEV;
+        return clients_have(&d->wire.clients, client) ? -EAGAIN : -ENODEV;
     UMockdevIoctlData *pointer = umockdev_ioctl_data_resolve(arg, 0, sizeof(void *), NULL);
     if (!pointer)
         return -EFAULT;
@@ -323,7 +326,7 @@ static int answer(struct usb_device *d, UMockdevIoctlClient *client)
     gulong request = umockdev_ioctl_client_get_request(client);
     if (request == USBDEVFS_REAPURBNDELAY || request == USBDEVFS_REAPURB)
         return reap(d, client, arg);
-    if (!d->wire.plugged)
+    if (!d->wire.plugged || !clients_have(&d->wire.clients, client))
         return -ENODEV;
     switch (request) {
     case USBDEVFS_SUBMITURB:
@@ -364,6 +367,7 @@ static void on_vanished(UMockdevIoctlBase *handler, UMockdevIoctlClient *client,
     (void)handler;
     struct usb_device *d = data;
     waiter_lock(&d->wire.waiter);
+    clients_remove(&d->wire.clients, client);
     drop_of(&d->pending, client);
     drop_of(&d->done, client);
     waiter_unlock(&d->wire.waiter);
@@ -371,46 +375,39 @@ static void on_vanished(UMockdevIoctlBase *handler, UMockdevIoctlClient *client,
 
 // ---- the plug ----------------------------------------------------------------------
 
-static void describe(const struct usb_device *d, GString *text)
-{
-    const struct usb_model *m = &d->model;
-    const uint8_t *b = m->descriptors;
-    g_string_append_printf(text,
-                           "P: /devices/usb1/1-1\nN: bus/usb/001/%03d\nE: SUBSYSTEM=usb\n"
-                           "E: DRIVER=usb\nE: BUSNUM=001\nE: DEVNUM=%03d\n"
-                           "E: DEVNAME=/dev/bus/usb/001/%03d\nE: DEVTYPE=usb_device\n"
-                           "E: PRODUCT=%x/%x/%x\nE: MAJOR=189\nE: MINOR=%d\n",
-                           d->number, d->number, d->number, b[8] | b[9] << 8, b[10] | b[11] << 8,
-                           b[12] | b[13] << 8, d->number - 1);
-    g_string_append_printf(text,
-                           "A: bConfigurationValue=1\\n\nA: busnum=1\\n\nA: devnum=%d\\n\n"
-                           "A: speed=%d\\n\nA: idVendor=%02x%02x\\n\nA: idProduct=%02x%02x\\n\n"
-                           "A: manufacturer=%s\\n\nA: product=%s\\n\nA: serial=%s\\n\n"
-                           "A: dev=189:%d\\n\nH: descriptors=",
-                           d->number, m->megabits, b[9], b[8], b[11], b[10], m->strings[1],
-                           m->strings[2], m->strings[3], d->number - 1);
-    for (size_t i = 0; i < m->descriptors_size; i++)
-        g_string_append_printf(text, "%02x", b[i]);
-    g_string_append_c(text, '\n');
-}
-
 static bool show(struct usb_device *d, struct error *err)
 {
     GString *text = g_string_new(NULL);
-    describe(d, text);
+    usb_place_describe(&d->place, &d->model, text);
     if (!wire_device_add(&d->wire, text, err) ||
         !node_link(&d->wire.node, d->wire.testbed, d->wire.devnode, err))
         return false;
-    umockdev_testbed_uevent(d->wire.testbed, SYSFS, "add");
+    d->shown = true;
+    umockdev_testbed_uevent(d->wire.testbed, d->place.sysfs, "add");
     return true;
+}
+
+static void withdraw(struct usb_device *d)
+{
+    umockdev_testbed_uevent(d->wire.testbed, d->place.sysfs, "remove");
+    umockdev_testbed_remove_device(d->wire.testbed, d->place.sysfs);
+    node_forget_number(d->wire.testbed, USB_MAJOR, usb_place_minor(&d->place));
+    wire_device_hide(&d->wire);
+    d->shown = false;
 }
 
 bool usb_device_plug(struct usb_device *device, struct error *err)
 {
     struct usb_device *d = device;
-    if (d->wire.plugged)
+    waiter_lock(&d->wire.waiter);
+    bool torn = d->wire.torn, plugged = d->wire.plugged;
+    waiter_unlock(&d->wire.waiter);
+    if (torn)
+        usb_device_unplug(d);
+    else if (plugged)
         return true;
-    snprintf(d->wire.devnode, sizeof(d->wire.devnode), "/dev/bus/usb/001/%03d", ++d->number);
+    usb_place_next(&d->place);
+    snprintf(d->wire.devnode, sizeof(d->wire.devnode), "%s", d->place.devnode);
     if (!wire_device_attach(&d->wire, err))
         return false;
     waiter_lock(&d->wire.waiter);
@@ -425,23 +422,43 @@ bool usb_device_plug(struct usb_device *device, struct error *err)
     return false;
 }
 
+static void torn_off(void *owner)
+{
+    usb_device_unplug(owner);
+}
+
 void usb_device_unplug(struct usb_device *device)
 {
     struct usb_device *d = device;
-    if (!d->wire.plugged)
-        return;
     waiter_lock(&d->wire.waiter);
-    d->wire.plugged = false;
-    while (d->pending.count > 0)
-        finish(d, 0, -ESHUTDOWN);
+    if (d->wire.plugged)
+        come_off(d);
+    d->wire.torn = false;
     waiter_unlock(&d->wire.waiter);
-    umockdev_testbed_uevent(d->wire.testbed, SYSFS, "remove");
-    umockdev_testbed_remove_device(d->wire.testbed, SYSFS);
-    wire_device_hide(&d->wire);
+    if (d->shown)
+        withdraw(d);
 }
 
-struct usb_device *usb_device_create(UMockdevTestbed *testbed, const struct usb_model *model,
-                                     uint64_t seed, struct error *err)
+bool usb_device_move(struct usb_device *device, struct error *err)
+{
+    usb_device_unplug(device);
+    device->place.bus = device->place.bus == 1 ? 2 : 1;
+    return usb_device_plug(device, err);
+}
+
+bool usb_device_become(struct usb_device *device, const struct usb_model *model,
+                       struct error *err)
+{
+    usb_device_unplug(device);
+    waiter_lock(&device->wire.waiter);
+    device->model = *model;
+    waiter_unlock(&device->wire.waiter);
+    return usb_device_plug(device, err);
+}
+
+struct usb_device *usb_device_create(UMockdevTestbed *testbed, pthread_mutex_t *pulling, int port,
+                                     const struct usb_model *model, uint64_t seed,
+                                     struct error *err)
 {
     struct usb_device *d = calloc(1, sizeof(*d));
     if (!d) {
@@ -449,7 +466,10 @@ struct usb_device *usb_device_create(UMockdevTestbed *testbed, const struct usb_
         return NULL;
     }
     d->model = *model;
-    d->number = FIRST_NUMBER - 1;
+    d->wire.pulling = pulling;
+    d->wire.torn_off = torn_off;
+    d->place.bus = 1;
+    d->place.port = port;
     bool started = wire_device_start(&d->wire, testbed, seed, 'u', pump, d, err);
     g_signal_connect(d->wire.handler, "handle-ioctl", G_CALLBACK(on_ioctl), d);
     g_signal_connect(d->wire.handler, "client-vanished", G_CALLBACK(on_vanished), d);
@@ -464,6 +484,17 @@ void usb_device_set_fault(struct usb_device *device, enum wire_fault fault)
     waiter_lock(&device->wire.waiter);
     device->wire.fault = fault;
     device->stall_armed = fault == WIRE_STALL;
+    device->full_packets = 0;
+    if (device->wire.plugged)
+        node_forbid(&device->wire.node, fault == WIRE_FORBIDDEN);
+    waiter_wake(&device->wire.waiter);
+    waiter_unlock(&device->wire.waiter);
+}
+
+void usb_with_model(struct usb_device *device, void (*act)(void *context), void *context)
+{
+    waiter_lock(&device->wire.waiter);
+    act(context);
     waiter_wake(&device->wire.waiter);
     waiter_unlock(&device->wire.waiter);
 }
@@ -473,6 +504,7 @@ void usb_device_destroy(struct usb_device *device)
     struct usb_device *d = device;
     if (!d)
         return;
+    wire_device_stop(&d->wire);
     usb_device_unplug(d);
     wire_device_end(&d->wire);
     for (; d->done.count > 0; d->done.count--)

@@ -4,6 +4,7 @@
 #ifndef SIMULATOR_USB_DEVICE_H
 #define SIMULATOR_USB_DEVICE_H
 
+#include <pthread.h>
 #include <stdbool.h>
 #include <umockdev.h>
 
@@ -13,22 +14,37 @@
 
 struct usb_device;
 
-// An unplugged device with its thread. NULL with err.
-struct usb_device *usb_device_create(UMockdevTestbed *testbed, const struct usb_model *model,
-                                     uint64_t seed, struct error *err);
+// An unplugged device with its thread. Whoever plugs or pulls at the testbed
+// holds pulling meanwhile; the device's own thread does when a fault pulls it.
+// port (1..) tells several devices of a bus apart. NULL with err.
+struct usb_device *usb_device_create(UMockdevTestbed *testbed, pthread_mutex_t *pulling, int port,
+                                     const struct usb_model *model, uint64_t seed,
+                                     struct error *err);
 
-// Shows up at bus 1, port 1 with the next device number. One thread at a time.
+// Shows up at its port with another device number than before.
 bool usb_device_plug(struct usb_device *device, struct error *err);
 
 // Goes away as a pulled plug does. Accepts an unplugged device.
 void usb_device_unplug(struct usb_device *device);
 
+// Goes from bus 1 to bus 2 or back.
+bool usb_device_move(struct usb_device *device, struct error *err);
+
+// Comes back as another device, or as itself.
+bool usb_device_become(struct usb_device *device, const struct usb_model *model,
+                       struct error *err);
+
 // SILENT: data of the device are lost. GARBAGE: random. SHORT: half the first
 // packet, the rest is lost. STALL: the next IN transfer stalls, once, and its
-// data are lost. Any thread.
+// data are lost. OVERFLOW: every IN transfer babbles. FORBIDDEN: the node may
+// not be opened. PULLED_IN_COMMAND: goes with the next OUT transfer.
+// PULLED_IN_SPECTRUM: goes with the second full packet of the device. Any thread.
 void usb_device_set_fault(struct usb_device *device, enum wire_fault fault);
 
-// Unplugs and ends the thread. Accepts NULL.
+// Calls act while the model is at rest. Any thread.
+void usb_with_model(struct usb_device *device, void (*act)(void *context), void *context);
+
+// Unplugs and ends the thread, without pulling held. Accepts NULL.
 void usb_device_destroy(struct usb_device *device);
 
 #endif

@@ -9,7 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { USB_PACKET_MOST = 512 };
+enum { USB_PACKET_MOST = 512, USB_DESCRIPTOR_MOST = 256 };
 
 // All calls of one model come from one thread at a time, now_ns never goes
 // back. -EAGAIN is NAK, -EPIPE a stall.
@@ -31,6 +31,17 @@ struct usb_model {
 
     // The host cleared a halt of this endpoint.
     void (*clear_halt)(void *context, uint8_t endpoint);
+
+    // The plug was pulled: when it is back, so is power.
+    void (*unplugged)(void *context, int64_t now_ns);
 };
+
+// The bridge chip of such instruments (Cypress FX2) when it found no firmware:
+// 04B4:8613, nothing to talk to.
+struct usb_model usb_blank_model(void);
+
+// What the device answers to GET_DESCRIPTOR; returns its size, 0 = it has none.
+size_t usb_descriptor(const struct usb_model *model, int type, int index,
+                      uint8_t out[USB_DESCRIPTOR_MOST]);
 
 #endif

@@ -8,64 +8,87 @@
 #include "base/clock.h"
 #include "files/write.h"
 #include "simulator/hid_device.h"
-#include "simulator/model_detector.h"
-#include "simulator/model_usb2000plus.h"
+#include "simulator/model_ooi.h"
 #include "simulator/model_wiimote.h"
 #include "simulator/usb_device.h"
 #include "simulator/wire_inclinometer.h"
 #include "simulator/wire_radiometer.h"
+#include "simulator/wire_tcp.h"
 
 enum { CALIBRATION_FIRST_NM = 340, CALIBRATION_LAST_NM = 1027 };
 #define CALIBRATION_CENTRE_NM 560.0
 #define CALIBRATION_SPAN_NM 180.0
 
+enum { SPECTROMETERS = 2 };
+
+struct spectrometer_end {
+    struct ooi *model;
+    struct usb_device *usb;
+    bool blank; // without its firmware
+};
+
 struct wire {
     struct wire_options options;
     UMockdevTestbed *testbed;
-    struct usb2000plus *spectrometer;
-    struct usb_device *spectrometer_usb;
+    struct spectrometer_end spectrometers[SPECTROMETERS]; // the second may not be there
     struct wiimote *camera;
     struct hid_device_emulated *camera_hid;
     struct inclinometer *inclinometer;
-    struct line *inclinometer_line;
+    struct line *inclinometer_line; // or inclinometer_tcp
+    struct tcp_end *inclinometer_tcp;
     struct radiometer_end *radiometer;
     struct line *radiometer_line;
 
     pthread_mutex_t lock; // plugs and pulls one at a time
-    bool pulled[WIRE_COUNT];
 };
 
 // ---- making ------------------------------------------------------------------------
 
-static bool write_calibration(const struct wire_options *o, struct error *err)
+static bool write_calibration(const struct wire *w, int which, struct error *err)
 {
+    const struct wire_options *o = &w->options;
     char path[512];
     struct whole_file file;
-    snprintf(path, sizeof(path), "%s/spectrometer.cal", o->run_dir);
+    snprintf(path, sizeof(path), "%s/spectrometer%s.cal", o->run_dir, which == 0 ? "" : "2");
     if (!whole_file_begin(&file, path, err))
         return false;
     fprintf(file.stream, "nm,uJ_per_count\n");
     for (int nm = CALIBRATION_FIRST_NM; nm <= CALIBRATION_LAST_NM; nm++) {
         double slope = (nm - CALIBRATION_CENTRE_NM) / CALIBRATION_SPAN_NM;
-        double k = detector_calibration(nm) * (1 + o->calibration_error * slope);
-        fprintf(file.stream, "%d,%.8e\n", nm, k);
+        double k = ooi_calibration(w->spectrometers[which].model, nm);
+        fprintf(file.stream, "%d,%.8e\n", nm, k * (1 + o->calibration_error * slope));
     }
     return whole_file_commit(&file, err);
 }
 
-static bool make_spectrometer(struct wire *w, struct error *err)
+static bool make_spectrometer(struct wire *w, int which, enum wire_instrument instrument,
+                              enum ooi_name kind, struct error *err)
 {
-    struct usb2000plus_options options = {.around = w->options.around,
-                                          .serial = w->options.serial[WIRE_SPECTROMETER],
-                                          .seed = w->options.seed,
-                                          .collector_mm2 = w->options.collector_mm2,
-                                          .powered_ns = clock_now_ns()};
-    w->spectrometer = usb2000plus_create(&options);
-    if (!w->spectrometer)
+    struct spectrometer_end *s = &w->spectrometers[which];
+    struct ooi_options options = {.around = w->options.around,
+                                  .kind = kind,
+                                  .serial = w->options.serial[instrument],
+                                  .seed = w->options.seed + (uint64_t)which,
+                                  .collector_mm2 = w->options.collector_mm2,
+                                  .powered_ns = clock_now_ns()};
+    s->model = ooi_create(&options);
+    if (!s->model)
         return fail(err, ERROR_SYSTEM, "out of memory");
-    struct usb_model model = usb2000plus_model(w->spectrometer);
-    w->spectrometer_usb = usb_device_create(w->testbed, &model, w->options.seed, err);
-    return w->spectrometer_usb != NULL;
+    struct usb_model model = ooi_model(s->model);
+    s->usb = usb_device_create(w->testbed, &w->lock, which + 1, &model, options.seed, err);
+    return s->usb && write_calibration(w, which, err);
+}
+
+static bool has_second(const struct wire_options *o)
+{
+    return o->serial[WIRE_SPECTROMETER_2] && o->serial[WIRE_SPECTROMETER_2][0];
+}
+
+static bool make_spectrometers(struct wire *w, struct error *err)
+{
+    const struct wire_options *o = &w->options;
+    return make_spectrometer(w, 0, WIRE_SPECTROMETER, o->model, err) &&
+           (!has_second(o) || make_spectrometer(w, 1, WIRE_SPECTROMETER_2, o->model_2, err));
 }
 
 static bool make_camera(struct wire *w, struct error *err)
@@ -90,13 +113,24 @@ static struct line *make_line(struct wire *w, const char *name, struct line_end 
     return line_create(path, &end, err);
 }
 
-static bool make_lines(struct wire *w, struct error *err)
+static bool make_inclinometer(struct wire *w, struct error *err)
 {
+    char path[512];
     w->inclinometer = inclinometer_create(&w->options, err);
     if (!w->inclinometer)
         return false;
-    w->inclinometer_line = make_line(w, "inclinometer", inclinometer_end(w->inclinometer), err);
-    if (!w->inclinometer_line)
+    struct line_end end = inclinometer_end(w->inclinometer);
+    snprintf(path, sizeof(path), "%s/inclinometer.port", w->options.run_dir);
+    if (w->options.inclinometer_tcp)
+        w->inclinometer_tcp = tcp_create(w->options.inclinometer_port, path, &end, err);
+    else
+        w->inclinometer_line = make_line(w, "inclinometer", end, err);
+    return w->inclinometer_tcp || w->inclinometer_line;
+}
+
+static bool make_lines(struct wire *w, struct error *err)
+{
+    if (!make_inclinometer(w, err))
         return false;
     w->radiometer = radiometer_create(&w->options, err);
     if (!w->radiometer)
@@ -107,13 +141,20 @@ static bool make_lines(struct wire *w, struct error *err)
 
 // ---- plugs ---------------------------------------------------------------------------
 
+static struct spectrometer_end *spectrometer(struct wire *w, enum wire_instrument instrument)
+{
+    return &w->spectrometers[instrument == WIRE_SPECTROMETER ? 0 : 1];
+}
+
 static bool plug(struct wire *w, enum wire_instrument instrument, struct error *err)
 {
     switch (instrument) {
     case WIRE_SPECTROMETER:
-        return usb_device_plug(w->spectrometer_usb, err);
+    case WIRE_SPECTROMETER_2:
+        return usb_device_plug(spectrometer(w, instrument)->usb, err);
     case WIRE_INCLINOMETER:
-        return line_plug(w->inclinometer_line, err);
+        return w->inclinometer_tcp ? tcp_plug(w->inclinometer_tcp, err)
+                                   : line_plug(w->inclinometer_line, err);
     case WIRE_CAMERA:
         return hid_plug(w->camera_hid, err);
     case WIRE_RADIOMETER:
@@ -128,11 +169,14 @@ static void unplug(struct wire *w, enum wire_instrument instrument)
 {
     switch (instrument) {
     case WIRE_SPECTROMETER:
-        usb_device_unplug(w->spectrometer_usb);
-        usb2000plus_power_on(w->spectrometer, clock_now_ns());
+    case WIRE_SPECTROMETER_2:
+        usb_device_unplug(spectrometer(w, instrument)->usb);
         break;
     case WIRE_INCLINOMETER:
-        line_unplug(w->inclinometer_line);
+        if (w->inclinometer_tcp)
+            tcp_unplug(w->inclinometer_tcp);
+        else
+            line_unplug(w->inclinometer_line);
         break;
     case WIRE_CAMERA:
         hid_unplug(w->camera_hid);
@@ -151,14 +195,54 @@ static void upset_camera(void *context)
     wiimote_upset(context);
 }
 
+struct upset {
+    struct ooi *model;
+    enum ooi_upset how;
+};
+
+static void upset_model(void *context)
+{
+    struct upset *upset = context;
+    ooi_upset(upset->model, upset->how);
+}
+
+static enum ooi_upset upset_of(enum wire_fault fault)
+{
+    return fault == WIRE_DEAF           ? OOI_DEAF
+           : fault == WIRE_NO_SYNC      ? OOI_NO_SYNC
+           : fault == WIRE_BAD_SYNC     ? OOI_BAD_SYNC
+           : fault == WIRE_OUT_OF_STEP  ? OOI_OUT_OF_STEP
+           : fault == WIRE_OTHER_PIXELS ? OOI_OTHER_PIXELS
+                                        : OOI_WELL;
+}
+
+static void set_usb_fault(struct spectrometer_end *s, enum wire_fault fault)
+{
+    struct upset upset = {s->model, upset_of(fault)};
+    bool blank = fault == WIRE_BLANK;
+    if (blank != s->blank && fault != WIRE_UNPLUGGED) {
+        struct usb_model face = blank ? usb_blank_model() : ooi_model(s->model);
+        usb_device_become(s->usb, &face, NULL);
+        s->blank = blank;
+    }
+    if (fault == WIRE_MOVED)
+        usb_device_move(s->usb, NULL);
+    usb_device_set_fault(s->usb, fault);
+    usb_with_model(s->usb, upset_model, &upset);
+}
+
 static void set_fault(struct wire *w, enum wire_instrument instrument, enum wire_fault fault)
 {
     switch (instrument) {
     case WIRE_SPECTROMETER:
-        usb_device_set_fault(w->spectrometer_usb, fault);
+    case WIRE_SPECTROMETER_2:
+        set_usb_fault(spectrometer(w, instrument), fault);
         break;
     case WIRE_INCLINOMETER:
-        line_set_fault(w->inclinometer_line, fault);
+        if (w->inclinometer_tcp)
+            tcp_set_fault(w->inclinometer_tcp, fault);
+        else
+            line_set_fault(w->inclinometer_line, fault);
         break;
     case WIRE_CAMERA:
         hid_set_fault(w->camera_hid, fault);
@@ -175,15 +259,14 @@ static void set_fault(struct wire *w, enum wire_instrument instrument, enum wire
 
 void wire_set_fault(struct wire *wire, enum wire_instrument instrument, enum wire_fault fault)
 {
-    if (instrument < 0 || instrument >= WIRE_COUNT)
+    bool there = instrument != WIRE_SPECTROMETER_2 || has_second(&wire->options);
+    if (!wire_fault_suits(instrument, fault) || !there)
         return;
     pthread_mutex_lock(&wire->lock);
-    bool pulled = fault == WIRE_UNPLUGGED;
-    if (pulled && !wire->pulled[instrument])
+    if (fault == WIRE_UNPLUGGED)
         unplug(wire, instrument);
-    else if (!pulled && wire->pulled[instrument])
-        pulled = !plug(wire, instrument, NULL); // stays pulled when the system has no terminal left
-    wire->pulled[instrument] = pulled;
+    else
+        plug(wire, instrument, NULL); // stays pulled when the system has no terminal left
     set_fault(wire, instrument, fault);
     pthread_mutex_unlock(&wire->lock);
 }
@@ -193,7 +276,9 @@ void wire_set_fault(struct wire *wire, enum wire_instrument instrument, enum wir
 static bool check(const struct wire_options *o, struct error *err)
 {
     for (int i = 0; i < WIRE_COUNT; i++)
-        if (!o->serial[i] || strncmp(o->serial[i], "EMU", 3) != 0)
+        if (i == WIRE_SPECTROMETER_2 && !has_second(o))
+            continue;
+        else if (!o->serial[i] || strncmp(o->serial[i], "EMU", 3) != 0)
             return fail(err, ERROR_CONFIG, "serial \"%s\": an emulated one begins with EMU",
                         o->serial[i] ? o->serial[i] : "");
     if (!(o->radiometer_hurry >= 1))
@@ -208,13 +293,15 @@ static bool start(struct wire *w, struct error *err)
     w->testbed = umockdev_testbed_new();
     if (!umockdev_in_mock_environment()) // right only once there is a testbed
         return fail(err, ERROR_CONFIG, "umockdev-wrapper must run the program");
-    if (!write_calibration(&w->options, err) || !make_spectrometer(w, err) ||
-        !make_camera(w, err) || !make_lines(w, err))
+    if (!make_spectrometers(w, err) || !make_camera(w, err) || !make_lines(w, err))
         return false;
-    for (int i = 0; i < WIRE_COUNT; i++)
-        if (!plug(w, (enum wire_instrument)i, err))
-            return false;
-    return true;
+    bool good = true;
+    pthread_mutex_lock(&w->lock);
+    for (int i = 0; good && i < WIRE_COUNT; i++)
+        if (i != WIRE_SPECTROMETER_2 || has_second(&w->options))
+            good = plug(w, (enum wire_instrument)i, err);
+    pthread_mutex_unlock(&w->lock);
+    return good;
 }
 
 struct wire *wire_start(const struct wire_options *options, struct error *err)
@@ -239,11 +326,14 @@ void wire_stop(struct wire *wire)
 {
     if (!wire)
         return;
-    usb_device_destroy(wire->spectrometer_usb);
+    for (int i = 0; i < SPECTROMETERS; i++)
+        usb_device_destroy(wire->spectrometers[i].usb);
     hid_emulation_end(wire->camera_hid);
     line_destroy(wire->inclinometer_line);
+    tcp_destroy(wire->inclinometer_tcp);
     line_destroy(wire->radiometer_line);
-    usb2000plus_destroy(wire->spectrometer);
+    for (int i = 0; i < SPECTROMETERS; i++)
+        ooi_destroy(wire->spectrometers[i].model);
     wiimote_destroy(wire->camera);
     inclinometer_destroy(wire->inclinometer);
     radiometer_destroy(wire->radiometer);

@@ -1,14 +1,42 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulator/wire_device.h"
 
+static void pull(struct wire_device *d)
+{
+    waiter_unlock(&d->waiter);
+    pthread_mutex_lock(d->pulling);
+    waiter_lock(&d->waiter);
+    bool torn = d->torn; // unless somebody was faster
+    waiter_unlock(&d->waiter);
+    if (torn)
+        d->torn_off(d->owner);
+    pthread_mutex_unlock(d->pulling);
+    waiter_lock(&d->waiter);
+}
+
 static void *run(void *argument)
 {
     struct wire_device *d = argument;
     waiter_lock(&d->waiter);
-    while (!d->stopping)
-        waiter_wait(&d->waiter, d->plugged ? d->pump(d->owner) : INT64_MAX);
+    while (!d->stopping) {
+        if (d->torn)
+            pull(d);
+        int64_t again_ns = d->plugged ? d->pump(d->owner) : INT64_MAX;
+        if (!d->torn)
+            waiter_wait(&d->waiter, again_ns);
+    }
     waiter_unlock(&d->waiter);
     return NULL;
+}
+
+static void on_connected(UMockdevIoctlBase *handler, UMockdevIoctlClient *client, gpointer data)
+{
+    (void)handler;
+    struct wire_device *d = data;
+    waiter_lock(&d->waiter);
+    if (d->plugged)
+        clients_add(&d->clients, client);
+    waiter_unlock(&d->waiter);
 }
 
 bool wire_device_start(struct wire_device *device, UMockdevTestbed *testbed, uint64_t seed,
@@ -22,6 +50,7 @@ bool wire_device_start(struct wire_device *device, UMockdevTestbed *testbed, uin
     d->handler = umockdev_ioctl_base_new();
     noise_init(&d->noise, seed, kind);
     waiter_init(&d->waiter);
+    g_signal_connect(d->handler, "client-connected", G_CALLBACK(on_connected), d);
     d->running = pthread_create(&d->thread, NULL, run, d) == 0;
     return d->running || fail(err, ERROR_SYSTEM, "starting a thread");
 }
@@ -62,16 +91,24 @@ void wire_device_hide(struct wire_device *device)
     waiter_unlock(&d->waiter);
 }
 
+void wire_device_stop(struct wire_device *device)
+{
+    struct wire_device *d = device;
+    if (!d->running)
+        return;
+    waiter_lock(&d->waiter);
+    d->stopping = true;
+    waiter_wake(&d->waiter);
+    waiter_unlock(&d->waiter);
+    pthread_join(d->thread, NULL);
+    d->running = false;
+}
+
 void wire_device_end(struct wire_device *device)
 {
     struct wire_device *d = device;
-    if (d->running) {
-        waiter_lock(&d->waiter);
-        d->stopping = true;
-        waiter_wake(&d->waiter);
-        waiter_unlock(&d->waiter);
-        pthread_join(d->thread, NULL);
-    }
+    wire_device_stop(d);
+    g_signal_handlers_disconnect_by_data(d->handler, d);
     g_signal_handlers_disconnect_by_data(d->handler, d->owner);
     g_object_unref(d->handler);
     waiter_fini(&d->waiter);

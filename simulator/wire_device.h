@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "simulator/model_noise.h"
 #include "simulator/wire.h"
+#include "simulator/wire_clients.h"
 #include "simulator/wire_node.h"
 #include "simulator/wire_wait.h"
 
@@ -29,6 +30,10 @@ struct wire_device {
     void *owner;
     pthread_t thread;
     bool running, stopping, plugged;
+    bool torn; // pulled by a fault: its thread then has torn_off called, with pulling held
+    pthread_mutex_t *pulling;
+    void (*torn_off)(void *owner);
+    struct clients clients; // since it was plugged
     enum wire_fault fault;
     struct noise noise;
 };
@@ -47,7 +52,10 @@ bool wire_device_add(struct wire_device *device, GString *text, struct error *er
 // Detaches the handler and hangs up.
 void wire_device_hide(struct wire_device *device);
 
-// Ends the thread; the device must be unplugged.
+// Ends the thread, the rest stays. Not while pulling is held.
+void wire_device_stop(struct wire_device *device);
+
+// Ends everything; the device must be unplugged.
 void wire_device_end(struct wire_device *device);
 
 #endif

@@ -3,18 +3,20 @@
 
 size_t fault_on(enum wire_fault fault, struct noise *noise, uint8_t *bytes, size_t size)
 {
-    switch (fault) {
-    case WIRE_SILENT:
-    case WIRE_UNPLUGGED:
+    if (fault == WIRE_SILENT || fault == WIRE_UNPLUGGED)
         return 0;
-    case WIRE_GARBAGE:
+    if (fault == WIRE_GARBAGE)
         noise_bytes(noise, bytes, size);
-        return size;
-    case WIRE_SHORT:
-        return size / 2;
-    case WIRE_FINE:
-    case WIRE_STALL:
-        break;
-    }
-    return size;
+    return fault == WIRE_SHORT ? size / 2 : size;
+}
+
+bool wire_fault_suits(enum wire_instrument instrument, enum wire_fault fault)
+{
+    static const unsigned wires[] = {
+#define X(name, text, wires) wires,
+        WIRE_FAULTS(X)
+#undef X
+    };
+    bool known = fault >= 0 && (size_t)fault < sizeof(wires) / sizeof(wires[0]);
+    return known && instrument >= 0 && instrument < WIRE_COUNT && wires[fault] & 1u << instrument;
 }

@@ -27,18 +27,41 @@ bool node_open(struct node *node, struct error *err)
     return true;
 }
 
+// The kernel lets nobody write here, root included.
+static const char unwritable[] = "/proc/sys/kernel/osrelease";
+
+static bool point_to(const char *path, const char *target)
+{
+    char fresh[512];
+    snprintf(fresh, sizeof(fresh), "%s.new", path);
+    unlink(fresh);
+    return symlink(target, fresh) == 0 && rename(fresh, path) == 0;
+}
+
 bool node_link(struct node *node, UMockdevTestbed *testbed, const char *devnode,
                struct error *err)
 {
-    char fresh[sizeof(node->path) + 4];
     char *root = umockdev_testbed_get_root_dir(testbed);
     snprintf(node->path, sizeof(node->path), "%s%s", root, devnode);
     g_free(root);
-    snprintf(fresh, sizeof(fresh), "%s.new", node->path);
-    unlink(fresh);
-    if (symlink(node->slave_path, fresh) != 0 || rename(fresh, node->path) != 0)
+    if (!point_to(node->path, node->slave_path))
         return fail_errno(err, "linking %s", node->path);
     return true;
+}
+
+void node_forbid(struct node *node, bool forbidden)
+{
+    if (node->path[0])
+        point_to(node->path, forbidden ? unwritable : node->slave_path);
+}
+
+void node_forget_number(UMockdevTestbed *testbed, int major_number, int minor_number)
+{
+    char link[256];
+    char *root = umockdev_testbed_get_root_dir(testbed);
+    snprintf(link, sizeof(link), "%s/sys/dev/char/%d:%d", root, major_number, minor_number);
+    g_free(root);
+    unlink(link);
 }
 
 void node_set_writable(struct node *node, bool writable)

@@ -25,11 +25,19 @@ bool node_open(struct node *node, struct error *err);
 bool node_link(struct node *node, UMockdevTestbed *testbed, const char *devnode,
                struct error *err);
 
+// Whether opening the node fails with EACCES, for root as for anybody. Leaves
+// those alone that have it open.
+void node_forbid(struct node *node, bool forbidden);
+
 // Whether the host may write (usbfs: whether something can be reaped).
 void node_set_writable(struct node *node, bool writable);
 
 // Whether the host may read. Call on changes only.
 void node_set_readable(struct node *node, bool readable);
+
+// Forgets the number of a device that was removed from the testbed, which
+// umockdev 0.17 does not: the next device with that number would abort.
+void node_forget_number(UMockdevTestbed *testbed, int major_number, int minor_number);
 
 // Removes the link and hangs up. Accepts a node closed before (master < 0).
 void node_close(struct node *node);

@@ -8,7 +8,7 @@
 #include "simulator/model_pr655.h"
 #include "simulator/wire_fault.h"
 
-enum { CHUNK = 4096, NOT_CONSTANT = -1 };
+enum { CHUNK = 4096, NOT_CONSTANT = -1, OVERLOADED = -2, TOO_WEAK = -8 };
 
 struct radiometer_end {
     struct pr655 *model;
@@ -57,7 +57,13 @@ static void hear(struct radiometer_end *r, int fd)
 static int64_t serve(void *context, int fd, bool readable, enum wire_fault fault)
 {
     struct radiometer_end *r = context;
-    pr655_upset(r->model, fault == WIRE_STALL ? NOT_CONSTANT : 0);
+    pr655_upset(r->model, fault == WIRE_STALL        ? NOT_CONSTANT
+                          : fault == WIRE_OVERLOAD   ? OVERLOADED
+                          : fault == WIRE_WEAK_LIGHT ? TOO_WEAK
+                                                     : 0);
+    pr655_lie(r->model, fault == WIRE_DRIFT     ? PR655_DRIFTING
+                        : fault == WIRE_MISREAD ? PR655_MISREADING
+                                                : PR655_TRUTHFUL);
     if (readable)
         hear(r, fd);
     char bytes[CHUNK];

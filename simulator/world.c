@@ -282,6 +282,17 @@ static void sense_markers(void *context, int64_t at_ns, struct vec3 out[3])
         out[i] = rigid_apply(w->camera_from_booth, out[i]);
 }
 
+static bool sense_fourth_marker(void *context, int64_t at_ns, struct vec3 *out)
+{
+    struct world *w = context;
+    struct world_state s = state_at(w, world_seconds(w, at_ns));
+    struct easel easel = easel_at(&w->scenario.stand, s.tilt_deg);
+    if (!head_fourth_marker(&w->scenario.head, s.eye, easel.centre, out))
+        return false;
+    *out = rigid_apply(w->camera_from_booth, *out);
+    return true;
+}
+
 // Four points at r / sqrt(2) give the mean over a disc of any quadratic.
 static double spot_illuminance(const struct world *w, const struct easel *easel, int lamp,
                                double x_px, double y_px)
@@ -391,7 +402,12 @@ static void sense_radiance(void *context, int64_t at_ns, struct spectrum *out)
 
 struct around world_around(struct world *world)
 {
-    return (struct around){world, sense_irradiance, sense_gravity, sense_markers, sense_radiance};
+    return (struct around){.context = world,
+                           .irradiance = sense_irradiance,
+                           .gravity = sense_gravity,
+                           .markers = sense_markers,
+                           .radiance = sense_radiance,
+                           .fourth_marker = sense_fourth_marker};
 }
 
 const struct scenario *world_scenario(const struct world *world)

@@ -221,6 +221,35 @@ static void upset_it_answers_its_status(void **state)
     assert_memory_equal(ask("M5\r"), "00000,", 6);
 }
 
+static double read_Y(void)
+{
+    double Y = 0;
+    assert_int_equal(sscanf(ask("M1\r"), "00000,0,%lf", &Y), 1);
+    return Y;
+}
+
+static void a_drifting_one_reads_more_each_time(void **state)
+{
+    (void)state;
+    ask("PHOTO\r");
+    double true_Y = read_Y();
+    pr655_lie(device, PR655_DRIFTING);
+    for (int i = 1; i <= 5; i++)
+        assert_true(fabs(read_Y() / (true_Y * pow(1.01, i)) - 1) < 2 * BRIGHT);
+    pr655_lie(device, PR655_TRUTHFUL);
+    assert_true(fabs(read_Y() / true_Y - 1) < 2 * BRIGHT);
+}
+
+static void a_misreading_one_is_wrong_every_third_time(void **state)
+{
+    (void)state;
+    ask("PHOTO\r");
+    double true_Y = read_Y();
+    pr655_lie(device, PR655_MISREADING);
+    for (int i = 0; i < 6; i++)
+        assert_true(fabs(read_Y() / (true_Y * (i % 3 ? 1 : 1.10)) - 1) < 2 * BRIGHT);
+}
+
 #define WITH(test) cmocka_unit_test_setup_teardown(test, fresh, gone)
 
 int main(void)
@@ -237,6 +266,8 @@ int main(void)
         WITH(too_much_is_an_overload),
         WITH(exposure_and_averages_are_set_within_range),
         WITH(upset_it_answers_its_status),
+        WITH(a_drifting_one_reads_more_each_time),
+        WITH(a_misreading_one_is_wrong_every_third_time),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

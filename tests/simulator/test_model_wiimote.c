@@ -25,11 +25,22 @@ static void show(void *context, int64_t at_ns, struct vec3 out[3])
     memcpy(out, places, sizeof(places));
 }
 
+static struct vec3 fourth;
+static bool has_fourth;
+
+static bool show_fourth(void *context, int64_t at_ns, struct vec3 *out)
+{
+    (void)context, (void)at_ns;
+    *out = fourth;
+    return has_fourth;
+}
+
 static int fresh(void **state)
 {
     (void)state;
+    has_fourth = false;
     struct wiimote_options options = {
-        .around = {.markers = show}, .serial = "EMU:WII:01", .seed = 3};
+        .around = {.markers = show, .fourth_marker = show_fourth}, .serial = "EMU:WII:01", .seed = 3};
     places[0] = (struct vec3){0, 0.04, 0.8};
     places[1] = (struct vec3){0.1, 0, 0.8};
     places[2] = (struct vec3){0, -0.07, 0.8};
@@ -183,6 +194,60 @@ static void the_basic_format_carries_the_same_places(void **state)
                  384 + f * 0.05);
 }
 
+// The two halves take turns; each holds two blobs of nine bytes.
+static void the_full_format_comes_in_two_halves_with_boxes_and_brightness(void **state)
+{
+    (void)state;
+    uint8_t report[HID_REPORT_MOST];
+    switch_camera_on("\x05");
+    send("\x12\x04\x3E", 3);
+    for (int i = 0; i < 4; i++) {
+        assert_int_equal(after(10 * MS, report), 22);
+        assert_int_equal(report[0], i % 2 ? 0x3F : 0x3E);
+        const uint8_t *at = report + 4;
+        if (i % 2 == 0) {
+            expect_point(extended(at), 512, 384 + 1334 * 0.04 / 0.8);
+            expect_point(extended(at + 9), 512 - 1334 * 0.1 / 0.8, 384);
+            assert_true(8 * at[3] <= 512 && 8 * at[5] + 8 >= 512);
+            assert_true(at[3] < 128 && at[5] < 128 && at[4] < at[6]);
+            assert_int_equal(at[7], 0);
+            assert_true(at[8] > 0);
+        } else {
+            expect_point(extended(at), 512, 384 - 1334 * 0.07 / 0.8);
+            assert_memory_equal(at + 9, "\xFF\xFF\xFF\xFF\xFF\xFF\xFF\xFF\xFF", 9);
+        }
+    }
+}
+
+// Upright z is 1 g: its eight bits are spread over the buttons' spare ones.
+static void the_full_format_spreads_the_acceleration_over_both_halves(void **state)
+{
+    (void)state;
+    uint8_t first[HID_REPORT_MOST], second[HID_REPORT_MOST];
+    switch_camera_on("\x05");
+    send("\x12\x04\x3F", 3);
+    assert_int_equal(after(10 * MS, first), 22);
+    assert_int_equal(after(10 * MS, second), 22);
+    int z = (first[1] >> 5 & 3) << 4 | (first[2] >> 5 & 3) << 6 | (second[1] >> 5 & 3) |
+            (second[2] >> 5 & 3) << 2;
+    assert_in_range(first[3], 0x80 - 4, 0x80 + 4);
+    assert_in_range(second[3], 0x80 - 4, 0x80 + 4);
+    // The halves are of two moments: a carry between them is worth 16 units.
+    assert_in_range(z, 0x80 + 26 - 20, 0x80 + 26 + 20);
+}
+
+static void a_fourth_marker_is_the_fourth_blob(void **state)
+{
+    (void)state;
+    uint8_t report[HID_REPORT_MOST];
+    has_fourth = true;
+    fourth = (struct vec3){-0.06, 0.03, 0.8};
+    switch_camera_on("\x03");
+    send("\x12\x04\x33", 3);
+    assert_int_equal(after(10 * MS, report), 18);
+    expect_point(extended(report + 15), 512 + 1334 * 0.06 / 0.8, 384 + 1334 * 0.03 / 0.8);
+}
+
 static void the_wrong_camera_mode_gives_no_points(void **state)
 {
     (void)state;
@@ -260,6 +325,9 @@ int main(void)
         WITH(registers_read_back),
         WITH(markers_appear_where_a_pinhole_of_42_degrees_puts_them),
         WITH(the_basic_format_carries_the_same_places),
+        WITH(the_full_format_comes_in_two_halves_with_boxes_and_brightness),
+        WITH(the_full_format_spreads_the_acceleration_over_both_halves),
+        WITH(a_fourth_marker_is_the_fourth_blob),
         WITH(the_wrong_camera_mode_gives_no_points),
         WITH(what_is_behind_or_outside_is_not_seen),
         WITH(a_hundred_reports_come_in_a_second),

@@ -27,7 +27,7 @@ static int fresh(void **state)
     (void)state;
     struct around around = {.gravity = gravity};
     field = (struct vec3){0, 0, 9.81};
-    witmotion_init(&device, &around, "EMUWT901-001", 5, 0);
+    witmotion_init(&device, WITMOTION_STANDARD, &around, "EMUWT901-001", 5, 0);
     return 0;
 }
 
@@ -98,6 +98,26 @@ static void temperature_is_a_room_s(void **state)
     assert_in_range(device.registers[0x40], 2000, 3500);
 }
 
+static double precise(int address)
+{
+    const uint16_t *r = device.registers + address;
+    return (int32_t)((uint32_t)r[1] << 16 | r[0]) / 1000.0;
+}
+
+static void the_precise_map_has_angles_of_32_bits_low_word_first(void **state)
+{
+    (void)state;
+    struct around around = {.gravity = gravity};
+    witmotion_init(&device, WITMOTION_PRECISE, &around, "EMUHWT9073", 5, 0);
+    look(9.80665 * sin(M_PI / 9), 0, -9.80665 * cos(M_PI / 9)); // over the back, pitch -20
+    assert_true(fabs(fabs(precise(0x3D)) - 180) < ANGLE_DEG);
+    assert_true(fabs(precise(0x3F) + 20) < ANGLE_DEG);
+    assert_true(fabs(precise(0x41)) < ANGLE_DEG);
+    assert_int_equal(device.registers[0x40], 0xFFFF); // the high word of a small negative
+    assert_in_range(device.registers[0x43], 2000, 3500);
+    assert_true(fabs(signed_word(0x36) / 32768 * 16 + cos(M_PI / 9)) < ACC_G);
+}
+
 #define WITH(test) cmocka_unit_test_setup(test, fresh)
 
 int main(void)
@@ -106,6 +126,7 @@ int main(void)
         WITH(flat_is_one_g_upwards_and_no_angle), WITH(tilting_the_screen_is_roll),
         WITH(leaning_sideways_is_pitch),          WITH(settings_stay_locked_without_the_key),
         WITH(it_bears_its_serial_and_address),    WITH(temperature_is_a_room_s),
+        WITH(the_precise_map_has_angles_of_32_bits_low_word_first),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -44,6 +44,36 @@ static void scenario_refused(const char *text, const char *because)
     unlink(path);
 }
 
+static void the_instruments_of_a_booth_are_chosen_by_name(void **state)
+{
+    (void)state;
+    struct scenario s;
+    struct error err = {0};
+    const char *path = file_with("[lamp1]\nname = A\n"
+                                 "[spectrometer]\nmodel = hr4000\n"
+                                 "[spectrometer2]\nserial = EMU4K0002\nmodel = usb4000\n"
+                                 "[inclinometer]\nmodel = hwt9073\ntcp = yes\nport = 1502\n"
+                                 "[head]\nmarkers = cap\nfourth = yes\n");
+    if (!scenario_load(path, &s, &err))
+        fail_msg("%s", err.text);
+    assert_int_equal(s.spectrometer.model, OOI_HR4000);
+    assert_int_equal(s.spectrometer_2.model, OOI_USB4000);
+    assert_string_equal(s.spectrometer_2.serial, "EMU4K0002");
+    assert_int_equal(s.inclinometer.model, WITMOTION_PRECISE);
+    assert_true(s.inclinometer.tcp);
+    assert_int_equal(s.inclinometer.port, 1502);
+    assert_int_equal(s.head.markers, HEAD_CAP);
+    assert_true(s.head.fourth);
+    unlink(path);
+    scenario_preset(&s);
+    assert_int_equal(s.spectrometer.model, OOI_USB2000PLUS);
+    assert_string_equal(s.spectrometer_2.serial, "");
+    scenario_refused("[lamp1]\nname = A\n[spectrometer]\nmodel = usb9\n", "usb4000");
+    scenario_refused("[lamp1]\nname = A\n[spectrometer2]\nserial = 007\n", "EMU");
+    scenario_refused("[lamp1]\nname = A\n[spectrometer2]\nserial = EMU2P0001\n",
+                     "the first one's");
+}
+
 static void the_shipped_booth_loads_with_its_three_lamps(void **state)
 {
     (void)state;
@@ -202,7 +232,7 @@ static void a_bad_script_is_refused_by_line(void **state)
         {"1 aim wall 1 2", "neither"},   {"1 aim screen 1280 0", "outside"},
         {"1 aim ceiling 2 0", "aim x"},  {"1 fault camera tired", "fine, unplugged"},
         {"1 fault mouse fine", "mouse"}, {"1 dance", "\"dance\" is not"},
-        {"1", "what happens"},
+        {"1", "what happens"},           {"1 fault camera deaf", "flood"},
     };
     struct scenario s;
     small_booth(&s);
@@ -240,6 +270,7 @@ static void an_empty_script_has_no_events(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_instruments_of_a_booth_are_chosen_by_name),
         cmocka_unit_test(the_shipped_booth_loads_with_its_three_lamps),
         cmocka_unit_test(a_bad_scenario_is_refused_by_file_and_key),
         cmocka_unit_test(a_missing_scenario_is_named),

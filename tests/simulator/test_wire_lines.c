@@ -130,6 +130,70 @@ static void the_inclinometer_s_faults_show(void **state)
     close_inclinometer(client);
 }
 
+static int read_errno(modbus_t *client)
+{
+    uint16_t words[3];
+    errno = 0;
+    int count = modbus_read_registers(client, 0x3D, 3, words);
+    int number = errno;
+    modbus_flush(client);
+    return count == 3 ? 0 : number;
+}
+
+static void the_inclinometer_says_every_exception(void **state)
+{
+    (void)state;
+    const struct {
+        enum wire_fault fault;
+        int number;
+    } rows[] = {{WIRE_BAD_FUNCTION, EMBXILFUN}, {WIRE_BAD_ADDRESS, EMBXILADD},
+                {WIRE_BAD_VALUE, EMBXILVAL},    {WIRE_DEVICE_FAILURE, EMBXSFAIL},
+                {WIRE_BAD_CRC, EMBBADCRC},      {WIRE_WRONG_UNIT, EMBBADSLAVE},
+                {WIRE_HALF_OPEN, ETIMEDOUT}};
+    modbus_t *client = open_inclinometer();
+    assert_int_equal(modbus_connect(client), 0);
+    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+        set_fault(WIRE_INCLINOMETER, rows[i].fault);
+        assert_int_equal(read_errno(client), rows[i].number);
+        set_fault(WIRE_INCLINOMETER, WIRE_FINE);
+        expect_tilt(client);
+    }
+    close_inclinometer(client);
+}
+
+static void every_second_answer_is_dropped(void **state)
+{
+    (void)state;
+    modbus_t *client = open_inclinometer();
+    assert_int_equal(modbus_connect(client), 0);
+    set_fault(WIRE_INCLINOMETER, WIRE_DROPPED);
+    for (int i = 0; i < 3; i++) {
+        assert_int_equal(read_errno(client), 0);
+        assert_int_equal(read_errno(client), ETIMEDOUT);
+    }
+    set_fault(WIRE_INCLINOMETER, WIRE_FINE);
+    expect_tilt(client);
+    close_inclinometer(client);
+}
+
+static void a_late_answer_comes_when_nobody_waits(void **state)
+{
+    (void)state;
+    uint16_t words[3];
+    modbus_t *client = open_inclinometer();
+    assert_int_equal(modbus_connect(client), 0);
+    set_fault(WIRE_INCLINOMETER, WIRE_LATE);
+    assert_int_equal(modbus_read_registers(client, 0x3D, 3, words), -1);
+    assert_int_equal(errno, ETIMEDOUT);
+    struct pollfd wait = {.fd = modbus_get_socket(client), .events = POLLIN};
+    assert_int_equal(poll(&wait, 1, 2 * REPLY_MS), 1);
+    set_fault(WIRE_INCLINOMETER, WIRE_FINE);
+    usleep(1000 * SILENCE_MS); // until all of it has come
+    modbus_flush(client);
+    expect_tilt(client);
+    close_inclinometer(client);
+}
+
 static void the_inclinometer_s_line_breaks_and_returns_ten_times(void **state)
 {
     (void)state;
@@ -181,6 +245,10 @@ static void the_radiometer_s_faults_show(void **state)
     tell(fd, "PHOTO\r", "\r\n", REPLY_MS);
     set_fault(WIRE_RADIOMETER, WIRE_STALL);
     assert_string_equal(tell(fd, "M1\r", "\r\n", REPLY_MS), "-0001\r\n");
+    set_fault(WIRE_RADIOMETER, WIRE_WEAK_LIGHT);
+    assert_string_equal(tell(fd, "M1\r", "\r\n", REPLY_MS), "-0008\r\n");
+    set_fault(WIRE_RADIOMETER, WIRE_OVERLOAD);
+    assert_string_equal(tell(fd, "M1\r", "\r\n", REPLY_MS), "-0002\r\n");
     set_fault(WIRE_RADIOMETER, WIRE_SILENT);
     assert_string_equal(tell(fd, "M1\r", "\r\n", SILENCE_MS), "");
     set_fault(WIRE_RADIOMETER, WIRE_SHORT);
@@ -216,6 +284,9 @@ int main(int argc, char **argv)
         cmocka_unit_test(the_inclinometer_answers_through_libmodbus),
         cmocka_unit_test(the_inclinometer_s_frames_are_the_documented_ones),
         cmocka_unit_test(the_inclinometer_s_faults_show),
+        cmocka_unit_test(the_inclinometer_says_every_exception),
+        cmocka_unit_test(every_second_answer_is_dropped),
+        cmocka_unit_test(a_late_answer_comes_when_nobody_waits),
         cmocka_unit_test(the_inclinometer_s_line_breaks_and_returns_ten_times),
         cmocka_unit_test(the_radiometer_measures_over_its_line),
         cmocka_unit_test(the_radiometer_s_faults_show),

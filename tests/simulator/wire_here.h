@@ -53,32 +53,46 @@ static struct world world = {.irradiance = 0.01, .radiance = 0.001};
 static struct wire *wire;
 static char folder[] = "/tmp/test_wire.XXXXXX";
 
-static inline int start(void **state)
+static inline struct wire_options usual(void)
 {
-    (void)state;
-    struct wire_options options = {
-        .around = {&world, irradiance, gravity, markers, radiance},
+    return (struct wire_options){
+        .around = {&world, irradiance, gravity, markers, radiance, NULL},
         .run_dir = folder,
         .serial = {"EMU2+H00417", "EMUWT901", "EMU:WII:01", "EMU65500123"},
         .seed = 1,
         .radiometer_hurry = 100,
         .collector_mm2 = 11.95,
     };
+}
+
+static inline int start_with(const struct wire_options *options)
+{
     struct error err;
-    assert_non_null(mkdtemp(folder));
-    wire = wire_start(&options, &err);
+    assert_non_null(mkdtemp(strcpy(folder, "/tmp/test_wire.XXXXXX")));
+    wire = wire_start(options, &err);
     if (!wire)
         fail_msg("%s", err.text);
     return 0;
 }
 
+static inline int start(void **state)
+{
+    (void)state;
+    struct wire_options options = usual();
+    return start_with(&options);
+}
+
 static inline int stop(void **state)
 {
     (void)state;
+    static const char *const left[] = {"spectrometer.cal", "spectrometer2.cal",
+                                       "inclinometer.port"};
     wire_stop(wire);
-    char path[64];
-    snprintf(path, sizeof(path), "%s/spectrometer.cal", folder);
-    unlink(path);
+    for (int i = 0; i < 3; i++) {
+        char path[64];
+        snprintf(path, sizeof(path), "%s/%s", folder, left[i]);
+        unlink(path);
+    }
     return rmdir(folder);
 }
 

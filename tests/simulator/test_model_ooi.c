@@ -11,7 +11,7 @@
 #include "colorimetry/colour.h"
 #include "colorimetry/illuminant.h"
 #include "simulator/model_detector.h"
-#include "simulator/model_usb2000plus.h"
+#include "simulator/model_ooi.h"
 
 #include <cmocka.h> // last: its fail() is a macro
 
@@ -48,32 +48,32 @@ static void shine(void *context, int64_t from_ns, int64_t to_ns, struct spectrum
 }
 
 static struct lamp lamp;
-static struct usb2000plus *device;
+static struct ooi *device;
 static struct usb_model model;
 
-static struct usb2000plus_options flat_light(double level)
+static struct ooi_options flat_light(double level)
 {
     lamp = (struct lamp){.before = level, .after = level};
     for (int i = 0; i < SPECTRUM_COUNT; i++)
         lamp.shape.v[i] = 1;
-    return (struct usb2000plus_options){.around = {.context = &lamp, .irradiance = shine},
+    return (struct ooi_options){.around = {.context = &lamp, .irradiance = shine},
                                         .serial = "EMU2+H00417",
                                         .seed = 7,
                                         .collector_mm2 = AREA_MM2};
 }
 
-static void make(const struct usb2000plus_options *options)
+static void make(const struct ooi_options *options)
 {
-    usb2000plus_destroy(device);
-    device = usb2000plus_create(options);
+    ooi_destroy(device);
+    device = ooi_create(options);
     assert_non_null(device);
-    model = usb2000plus_model(device);
+    model = ooi_model(device);
 }
 
 static int fresh(void **state)
 {
     (void)state;
-    struct usb2000plus_options options = flat_light(0.01);
+    struct ooi_options options = flat_light(0.01);
     make(&options);
     return 0;
 }
@@ -81,7 +81,7 @@ static int fresh(void **state)
 static int gone(void **state)
 {
     (void)state;
-    usb2000plus_destroy(device);
+    ooi_destroy(device);
     device = NULL;
     return 0;
 }
@@ -226,7 +226,7 @@ static void registers_say_programmed_and_saturation(void **state)
 static void a_flame_echoes_fe_and_calls_itself_version_3(void **state)
 {
     (void)state;
-    struct usb2000plus_options options = flat_light(0);
+    struct ooi_options options = flat_light(0);
     options.flame = true;
     make(&options);
     uint8_t packet[USB_PACKET_MOST];
@@ -310,7 +310,7 @@ static void slots_beyond_the_last_are_not_answered(void **state)
 static void slots_never_programmed_read_ff(void **state)
 {
     (void)state;
-    struct usb2000plus_options options = flat_light(0);
+    struct ooi_options options = flat_light(0);
     options.blank_nonlinearity = true;
     make(&options);
     send(0, "\x05\x06", 2);
@@ -401,7 +401,7 @@ static void without_a_trigger_nothing_comes(void **state)
 static void at_full_speed_packets_have_64_bytes(void **state)
 {
     (void)state;
-    struct usb2000plus_options options = flat_light(0.01);
+    struct ooi_options options = flat_light(0.01);
     options.full_speed = true;
     make(&options);
     uint8_t packet[USB_PACKET_MOST];
@@ -422,7 +422,7 @@ static void two_devices_of_one_seed_say_the_same(void **state)
     (void)state;
     uint16_t one[PIXELS], two[PIXELS];
     ask_and_read(0, one);
-    struct usb2000plus_options options = flat_light(0.01);
+    struct ooi_options options = flat_light(0.01);
     make(&options);
     ask_and_read(0, two);
     assert_memory_equal(one, two, sizeof(one));
@@ -434,7 +434,7 @@ static void black_pixels_see_nothing_and_light_clips_at_saturation(void **state)
 {
     (void)state;
     uint16_t raw[PIXELS];
-    struct usb2000plus_options options = flat_light(10);
+    struct ooi_options options = flat_light(10);
     make(&options);
     ask_and_read(0, raw);
     for (int p = 0; p < 18; p++)
@@ -447,7 +447,7 @@ static void in_the_dark_all_pixels_stay_near_the_baseline(void **state)
 {
     (void)state;
     uint16_t raw[PIXELS];
-    struct usb2000plus_options options = flat_light(0);
+    struct ooi_options options = flat_light(0);
     make(&options);
     send(0, "\x02\x10\x27\x00\x00", 5);
     ask_and_read(0, raw);
@@ -510,7 +510,7 @@ static void a_booth_s_light_fills_the_scale_in_20_to_100_ms(void **state)
         spectrum_scale(&light, 1500 / xyz_absolute(&light, OBSERVER_1931_2).Y);
         double top = 0;
         uint16_t raw[PIXELS];
-        struct usb2000plus_options options = flat_light(1);
+        struct ooi_options options = flat_light(1);
         lamp.shape = light;
         make(&options);
         send(0, "\x02\x20\x4E\x00\x00", 5); // 20 ms

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "simulator/model_usb2000plus.h"
+#include "simulator/model_ooi.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -20,18 +20,22 @@ enum command {
     READ_REGISTER = 0x6B,
     READ_TEMPERATURE = 0x6C,
     READ_IRRADIANCE = 0x6D,
+    ENABLE_COOLER = 0x71,
+    READ_COOLER = 0x72,
+    SET_COOLER = 0x73,
     STATUS = 0xFE,
 };
 
-enum { COMMAND_OUT = 0x01, REPLY_IN = 0x81, SPECTRUM_IN = 0x82, UNUSED_IN = 0x86 };
+enum { COMMAND_OUT = 0x01, REPLY_IN = 0x81, SPECTRUM_IN = 0x82, APART_IN = 0x86 };
 
 enum {
     SLOTS = 20,
     WRITABLE_SLOTS = 19,
     SLOT_SIZE = 15,
     SYNC = 0x69,
-    SPECTRUM_SIZE = 2 * DETECTOR_PIXELS + 1,
-    SATURATION = 26000, // raw counts
+    WRONG_SYNC = 0x96,
+    SPECTRUM_MOST = 2 * DETECTOR_PIXELS_MOST + 1,
+    ROOM_TENTHS = 240, // degrees
     REPLIES = 4,
     REPLY_MOST = 64,
     SPARE_CYCLES = 2,
@@ -40,19 +44,21 @@ enum {
 
 enum { REGISTER_VERSION = 0x04, REGISTER_PROGRAMMED = 0x64, REGISTER_SATURATION = 0x68 };
 
-#define INTEGRATION_LEAST_US 1000u
-#define INTEGRATION_MOST_US 65535000u
 #define COARSE_FROM_US 655000u
 #define START_DELAY_NS 8500
 #define READOUT_NS 900000
+#define SHUTTER_BELOW_US 3800u // of a free-running device
+#define SHUTTER_PERIOD_NS (3 * 3800 * INT64_C(1000))
 
 struct reply {
     uint8_t bytes[REPLY_MOST];
     size_t size;
 };
 
-struct usb2000plus {
-    struct usb2000plus_options options;
+struct ooi {
+    struct ooi_options options;
+    const struct ooi_kind *kind;
+    enum ooi_upset upset;
     struct detector *detector;
     struct noise noise;
     uint8_t descriptors[18 + 9 + 9 + 4 * 7];
@@ -61,7 +67,8 @@ struct usb2000plus {
     uint16_t registers[256];
 
     uint32_t integration_us;
-    bool strobe, powered, halted;
+    bool strobe, powered, halted, cooling;
+    int cooler_tenths;
     uint8_t trigger;
 
     struct reply replies[REPLIES];
@@ -71,43 +78,40 @@ struct usb2000plus {
     int requests, spare;
     int64_t light_from_ns, light_to_ns, ready_ns;
 
-    uint8_t spectrum[SPECTRUM_SIZE];
-    bool loaded;
-    size_t sent;
+    uint8_t spectrum[SPECTRUM_MOST];
+    bool loaded, stale; // stale: a byte of the spectrum before is still to be sent
+    size_t size;
+    struct {
+        size_t from, to; // of spectrum, still to be sent
+    } apart, rest;
 };
 
 // ---- what the factory wrote --------------------------------------------------
 
-static const char *const wavelength_text[4] = {"339.90000000000", "3.83000e-01", "-2.05240e-05",
-                                               "-1.27080e-09"};
-static const char *const nonlinearity_text[8] = {
-    "9.50000e-01",  "2.74662e-06",  "-6.05377e-11", "1.06587e-15",
-    "-2.27697e-20", "3.14355e-25", "-2.27214e-30", "5.77841e-36"};
-
-static void set_slot(struct usb2000plus *d, int slot, const char *text)
+static void set_slot(struct ooi *d, int slot, const char *text)
 {
     noise_bytes(&d->noise, d->slots[slot], SLOT_SIZE);
     size_t size = strlen(text) + 1; // with its NUL, unless it fills the slot
     memcpy(d->slots[slot], text, size < SLOT_SIZE ? size : SLOT_SIZE);
 }
 
-static void set_slots(struct usb2000plus *d)
+static void set_slots(struct ooi *d)
 {
     memset(d->slots, 0xFF, sizeof(d->slots));
     set_slot(d, 0, d->serial);
     for (int i = 0; i < 4; i++)
-        set_slot(d, 1 + i, wavelength_text[i]);
+        set_slot(d, 1 + i, d->kind->wavelength[i]);
     set_slot(d, 5, "2.0e-04");
     if (!d->options.blank_nonlinearity) {
         for (int i = 0; i < 8; i++)
-            set_slot(d, 6 + i, nonlinearity_text[i]);
+            set_slot(d, 6 + i, d->kind->nonlinearity[i]);
         set_slot(d, 14, "7");
     }
     set_slot(d, 15, "3 000 025");
     set_slot(d, 16, "SVL 4");
     noise_bytes(&d->noise, d->slots[17], SLOT_SIZE);
-    d->slots[17][4] = SATURATION & 0xFF;
-    d->slots[17][5] = SATURATION >> 8;
+    d->slots[17][d->kind->saturation_at] = d->kind->saturation & 0xFF;
+    d->slots[17][d->kind->saturation_at + 1] = (uint8_t)(d->kind->saturation >> 8);
 }
 
 static size_t put(uint8_t *to, const uint8_t *bytes, size_t size)
@@ -116,14 +120,15 @@ static size_t put(uint8_t *to, const uint8_t *bytes, size_t size)
     return size;
 }
 
-static void set_descriptors(struct usb2000plus *d)
+static void set_descriptors(struct ooi *d)
 {
     uint8_t packet_lo = d->options.full_speed ? 64 : 0, packet_hi = d->options.full_speed ? 0 : 2;
-    const uint8_t device[18] = {18,   1,    0x00, 0x02, 0,    0,    0, 64, 0x57,
-                                0x24, 0x1e, 0x10, 0x02, 0x00, 1,    2, 3,  1};
+    uint8_t product_lo = d->kind->product & 0xFF, product_hi = d->kind->product >> 8;
+    const uint8_t device[18] = {18,   1,          0x00,       0x02, 0,    0, 0, 64, 0x57,
+                                0x24, product_lo, product_hi, 0x02, 0x00, 1, 2, 3,  1};
     const uint8_t configuration[9] = {9, 2, 9 + 9 + 4 * 7, 0, 1, 1, 0, 0x80, 125};
     const uint8_t interface[9] = {9, 4, 0, 0, 4, 0xff, 0, 0, 0};
-    const uint8_t endpoints[4] = {COMMAND_OUT, SPECTRUM_IN, UNUSED_IN, REPLY_IN};
+    const uint8_t endpoints[4] = {COMMAND_OUT, SPECTRUM_IN, APART_IN, REPLY_IN};
     uint8_t *at = d->descriptors;
     at += put(at, device, sizeof(device));
     at += put(at, configuration, sizeof(configuration));
@@ -134,52 +139,70 @@ static void set_descriptors(struct usb2000plus *d)
     }
 }
 
-static struct detector *make_detector(const struct usb2000plus_options *options)
+static struct detector *make_detector(const struct ooi *d)
 {
-    struct detector_options detector = {.saturation = SATURATION,
-                                        .collector_mm2 = options->collector_mm2,
-                                        .seed = options->seed};
+    struct detector_options detector = {.saturation = d->kind->saturation,
+                                        .zones = d->kind->zones,
+                                        .full = d->kind->full,
+                                        .collector_mm2 = d->options.collector_mm2,
+                                        .seed = d->options.seed};
     for (int i = 0; i < 4; i++)
-        detector.wavelength[i] = strtod(wavelength_text[i], NULL);
+        detector.wavelength[i] = strtod(d->kind->wavelength[i], NULL);
     for (int i = 0; i < 8; i++)
-        detector.nonlinearity[i] = strtod(nonlinearity_text[i], NULL);
+        detector.nonlinearity[i] = strtod(d->kind->nonlinearity[i], NULL);
     return detector_create(&detector);
 }
 
-void usb2000plus_power_on(struct usb2000plus *device, int64_t now_ns)
+double ooi_calibration(const struct ooi *device, double nm)
 {
-    struct usb2000plus *d = device;
+    return detector_calibration(nm) * 65535 / device->kind->full;
+}
+
+void ooi_upset(struct ooi *device, enum ooi_upset upset)
+{
+    device->upset = upset;
+}
+
+static void start_cycle(struct ooi *d, int64_t at_ns);
+
+static void power_on(void *context, int64_t now_ns)
+{
+    struct ooi *d = context;
     d->options.powered_ns = now_ns;
     memset(d->registers, 0, sizeof(d->registers));
     d->registers[REGISTER_VERSION] = d->options.flame ? 0x3012 : 0x2012;
     d->registers[REGISTER_PROGRAMMED] = 0x5501;
-    d->registers[REGISTER_SATURATION] = SATURATION;
+    d->registers[REGISTER_SATURATION] = (uint16_t)d->kind->saturation;
     d->integration_us = 100000;
     d->powered = true;
-    d->strobe = d->halted = d->integrating = d->loaded = false;
+    d->strobe = d->halted = d->integrating = d->loaded = d->stale = d->cooling = false;
+    d->cooler_tenths = ROOM_TENTHS;
     d->trigger = 0;
     d->reply_count = d->requests = d->spare = 0;
+    if (d->kind->free_running)
+        start_cycle(d, now_ns);
 }
 
-struct usb2000plus *usb2000plus_create(const struct usb2000plus_options *options)
+struct ooi *ooi_create(const struct ooi_options *options)
 {
-    struct usb2000plus *d = calloc(1, sizeof(*d));
+    struct ooi *d = calloc(1, sizeof(*d));
     if (!d)
         return NULL;
     d->options = *options;
+    d->kind = ooi_kind(options->kind);
     snprintf(d->serial, sizeof(d->serial), "%s", options->serial);
     noise_init(&d->noise, options->seed, 's');
     set_slots(d);
     set_descriptors(d);
-    usb2000plus_power_on(d, options->powered_ns);
-    d->detector = make_detector(options);
+    power_on(d, options->powered_ns);
+    d->detector = make_detector(d);
     if (d->detector)
         return d;
-    usb2000plus_destroy(d);
+    ooi_destroy(d);
     return NULL;
 }
 
-void usb2000plus_destroy(struct usb2000plus *device)
+void ooi_destroy(struct ooi *device)
 {
     if (!device)
         return;
@@ -191,51 +214,83 @@ void usb2000plus_destroy(struct usb2000plus *device)
 
 // The device integrates ahead: a cycle in progress keeps the integration time
 // and the light it began with, whatever the host changes meanwhile.
-static void start_cycle(struct usb2000plus *d, int64_t at_ns)
+static void start_cycle(struct ooi *d, int64_t at_ns)
 {
+    int64_t light_ns = (int64_t)d->integration_us * 1000;
     d->integrating = true;
+    if (d->kind->free_running && d->integration_us < SHUTTER_BELOW_US) {
+        d->ready_ns = at_ns + SHUTTER_PERIOD_NS;
+        d->light_to_ns = d->ready_ns - READOUT_NS;
+        d->light_from_ns = d->light_to_ns - light_ns;
+        return;
+    }
     d->light_from_ns = at_ns + START_DELAY_NS;
-    d->light_to_ns = d->light_from_ns + (int64_t)d->integration_us * 1000;
+    d->light_to_ns = d->light_from_ns + light_ns;
     d->ready_ns = d->light_to_ns + READOUT_NS;
 }
 
-static void load_spectrum(struct usb2000plus *d)
+static void put_in_parts(struct ooi *d)
+{
+    size_t apart = d->options.full_speed ? 0 : (size_t)d->kind->apart;
+    apart = apart < d->size ? apart : d->size;
+    d->apart.from = 0;
+    d->apart.to = d->rest.from = apart;
+    d->rest.to = d->size;
+}
+
+static void load_spectrum(struct ooi *d)
 {
     struct spectrum light;
     d->options.around.irradiance(d->options.around.context, d->light_from_ns, d->light_to_ns,
                                  &light);
-    uint16_t raw[DETECTOR_PIXELS];
+    uint16_t raw[DETECTOR_PIXELS_MOST];
     detector_expose(d->detector, &light, (double)(d->light_to_ns - d->light_from_ns) * 1e-9,
                     (double)(d->light_to_ns - d->options.powered_ns) * 1e-9, &d->noise, raw);
-    for (int p = 0; p < DETECTOR_PIXELS; p++) {
-        d->spectrum[2 * p] = raw[p] & 0xFF;
-        d->spectrum[2 * p + 1] = raw[p] >> 8;
+    int pixels = d->upset == OOI_OTHER_PIXELS ? d->kind->pixels / 2 : d->kind->pixels;
+    for (int p = 0; p < pixels; p++) {
+        uint16_t sent = raw[p] ^ d->kind->inverted;
+        d->spectrum[2 * p] = sent & 0xFF;
+        d->spectrum[2 * p + 1] = sent >> 8;
     }
-    d->spectrum[SPECTRUM_SIZE - 1] = SYNC;
+    d->spectrum[2 * pixels] = d->upset == OOI_BAD_SYNC ? WRONG_SYNC : SYNC;
+    d->size = 2 * (size_t)pixels + (d->upset != OOI_NO_SYNC);
+    d->stale = d->upset == OOI_OUT_OF_STEP;
     d->loaded = true;
-    d->sent = 0;
+    put_in_parts(d);
 }
 
-static void advance(struct usb2000plus *d, int64_t now_ns)
+// Cycles that nobody asked for end unseen.
+static void skip(struct ooi *d, int64_t now_ns)
+{
+    int64_t end_ns = d->ready_ns;
+    start_cycle(d, end_ns);
+    int64_t period_ns = d->ready_ns - end_ns;
+    if (now_ns >= d->ready_ns)
+        start_cycle(d, end_ns + (now_ns - end_ns) / period_ns * period_ns);
+}
+
+static void advance(struct ooi *d, int64_t now_ns)
 {
     while (d->integrating && now_ns >= d->ready_ns) {
         d->integrating = false;
         if (d->requests > 0) {
             d->requests--;
             load_spectrum(d);
+        } else if (d->kind->free_running) {
+            skip(d, now_ns);
         } else if (--d->spare > 0) {
             start_cycle(d, d->ready_ns);
         }
     }
 }
 
-static void start_if_idle(struct usb2000plus *d, int64_t now_ns)
+static void start_if_idle(struct ooi *d, int64_t now_ns)
 {
     if (d->requests > 0 && !d->integrating && !d->loaded && d->powered && d->trigger == 0)
         start_cycle(d, now_ns);
 }
 
-static void read_out(struct usb2000plus *d, int64_t now_ns)
+static void read_out(struct ooi *d, int64_t now_ns)
 {
     d->loaded = false;
     d->spare = SPARE_CYCLES;
@@ -243,7 +298,7 @@ static void read_out(struct usb2000plus *d, int64_t now_ns)
         start_cycle(d, now_ns);
 }
 
-static void stop(struct usb2000plus *d)
+static void stop(struct ooi *d)
 {
     d->integrating = d->loaded = false;
     d->requests = 0;
@@ -259,7 +314,7 @@ static uint32_t little(const uint8_t *bytes, int count)
     return value;
 }
 
-static void reply(struct usb2000plus *d, const uint8_t *bytes, size_t size)
+static void reply(struct ooi *d, const uint8_t *bytes, size_t size)
 {
     if (d->reply_count == REPLIES)
         return;
@@ -268,14 +323,15 @@ static void reply(struct usb2000plus *d, const uint8_t *bytes, size_t size)
     r->size = size;
 }
 
-static void set_integration(struct usb2000plus *d, uint32_t us)
+static void set_integration(struct ooi *d, uint32_t units)
 {
-    if (us < INTEGRATION_LEAST_US || us > INTEGRATION_MOST_US)
+    uint64_t us = (uint64_t)units * d->kind->unit_us;
+    if (us < d->kind->least_us || us > d->kind->most_us || d->upset == OOI_DEAF)
         return;
-    d->integration_us = us - us % (us < COARSE_FROM_US ? 10 : 1000);
+    d->integration_us = (uint32_t)(us - us % (us < COARSE_FROM_US ? 10 : 1000));
 }
 
-static void read_slot(struct usb2000plus *d, uint8_t slot)
+static void read_slot(struct ooi *d, uint8_t slot)
 {
     if (slot >= SLOTS)
         return;
@@ -284,7 +340,7 @@ static void read_slot(struct usb2000plus *d, uint8_t slot)
     reply(d, bytes, sizeof(bytes));
 }
 
-static void write_slot(struct usb2000plus *d, const uint8_t *bytes, size_t size)
+static void write_slot(struct ooi *d, const uint8_t *bytes, size_t size)
 {
     if (bytes[1] >= WRITABLE_SLOTS || bytes[1] == 17)
         return;
@@ -292,14 +348,14 @@ static void write_slot(struct usb2000plus *d, const uint8_t *bytes, size_t size)
     memcpy(d->slots[bytes[1]], bytes + 2, count);
 }
 
-static void read_register(struct usb2000plus *d, uint8_t address)
+static void read_register(struct ooi *d, uint8_t address)
 {
     uint16_t value = d->registers[address];
     uint8_t echo = d->options.flame ? 0xFE : address;
     reply(d, (uint8_t[]){echo, value & 0xFF, value >> 8}, 3);
 }
 
-static void read_temperature(struct usb2000plus *d, int64_t now_ns)
+static void read_temperature(struct ooi *d, int64_t now_ns)
 {
     double age_s = (double)(now_ns - d->options.powered_ns) * 1e-9;
     double degrees = 24 + 5 * (1 - 1 / (1 + age_s / 600));
@@ -307,30 +363,33 @@ static void read_temperature(struct usb2000plus *d, int64_t now_ns)
     reply(d, (uint8_t[]){0x08, value & 0xFF, (uint8_t)(value >> 8)}, 3);
 }
 
-static void read_status(struct usb2000plus *d)
+static void read_status(struct ooi *d)
 {
     size_t packet = d->options.full_speed ? 64 : 512;
-    size_t left = d->loaded ? SPECTRUM_SIZE - d->sent : 0;
-    uint8_t s[16] = {DETECTOR_PIXELS & 0xFF, DETECTOR_PIXELS >> 8};
+    size_t left = d->loaded ? d->apart.to - d->apart.from + d->rest.to - d->rest.from : 0;
+    size_t whole = 2 * (size_t)d->kind->pixels + 1;
+    uint8_t s[16] = {d->kind->pixels & 0xFF, (uint8_t)(d->kind->pixels >> 8)};
     for (int i = 0; i < 4; i++)
-        s[2 + i] = (uint8_t)(d->integration_us >> (8 * i));
+        s[2 + i] = (uint8_t)(d->integration_us / d->kind->unit_us >> (8 * i));
     s[6] = d->strobe;
     s[7] = d->trigger;
     s[8] = d->loaded ? 0x04 : d->requests > 0 ? 0x02 : 0;
-    s[9] = (uint8_t)((SPECTRUM_SIZE + packet - 1) / packet);
+    s[9] = (uint8_t)((whole + packet - 1) / packet);
     s[10] = d->powered;
     s[11] = (uint8_t)((left + packet - 1) / packet);
     s[14] = d->options.full_speed ? 0x00 : 0x80;
     reply(d, s, sizeof(s));
 }
 
-static void set_trigger(struct usb2000plus *d, uint32_t mode, int64_t now_ns)
+static void set_trigger(struct ooi *d, uint32_t mode, int64_t now_ns)
 {
     if (mode >= TRIGGER_MODES)
         return;
     d->trigger = (uint8_t)mode;
     if (mode != 0) // nothing is wired to the trigger input: no cycle ever starts
         d->integrating = false;
+    else if (d->kind->free_running && !d->integrating && !d->loaded && d->powered)
+        start_cycle(d, now_ns);
     start_if_idle(d, now_ns);
 }
 
@@ -343,6 +402,8 @@ static size_t payload_of(uint8_t command)
     case SET_POWER:
     case SET_TRIGGER:
     case READ_IRRADIANCE:
+    case ENABLE_COOLER:
+    case SET_COOLER:
         return 2;
     case READ_SLOT:
     case WRITE_SLOT:
@@ -355,8 +416,20 @@ static size_t payload_of(uint8_t command)
     }
 }
 
-// Commands that are answered.
-static int answer(struct usb2000plus *d, const uint8_t *bytes, int64_t now_ns)
+// The detector is where it was told to be at once.
+static void use_cooler(struct ooi *d, const uint8_t *bytes)
+{
+    int now = d->cooling ? d->cooler_tenths : ROOM_TENTHS;
+    if (bytes[0] == ENABLE_COOLER)
+        d->cooling = little(bytes + 1, 2) != 0;
+    else if (bytes[0] == SET_COOLER)
+        d->cooler_tenths = (int16_t)little(bytes + 1, 2);
+    else
+        reply(d, (uint8_t[]){(uint8_t)now, (uint8_t)(now >> 8)}, 2);
+}
+
+// Commands that are answered, and those few know.
+static int answer(struct ooi *d, const uint8_t *bytes, int64_t now_ns)
 {
     uint8_t blank[60];
     switch (bytes[0]) {
@@ -381,13 +454,22 @@ static int answer(struct usb2000plus *d, const uint8_t *bytes, int64_t now_ns)
     case STATUS:
         read_status(d);
         return 0;
+    case ENABLE_COOLER:
+    case READ_COOLER:
+    case SET_COOLER:
+        if (d->kind->cooled) {
+            use_cooler(d, bytes);
+            return 0;
+        }
+        break;
     default:
-        d->halted = true;
-        return -EPIPE;
+        break;
     }
+    d->halted = true;
+    return -EPIPE;
 }
 
-static int execute(struct usb2000plus *d, const uint8_t *bytes, size_t size, int64_t now_ns)
+static int execute(struct ooi *d, const uint8_t *bytes, size_t size, int64_t now_ns)
 {
     switch (bytes[0]) {
     case INITIALISE:
@@ -403,6 +485,8 @@ static int execute(struct usb2000plus *d, const uint8_t *bytes, size_t size, int
         d->powered = little(bytes + 1, 2) != 0;
         if (!d->powered)
             stop(d);
+        else
+            set_trigger(d, d->trigger, now_ns);
         return 0;
     case WRITE_SLOT:
         write_slot(d, bytes, size);
@@ -424,7 +508,7 @@ static int execute(struct usb2000plus *d, const uint8_t *bytes, size_t size, int
 static int on_out(void *context, uint8_t endpoint, int64_t now_ns, const uint8_t *bytes,
                   size_t size)
 {
-    struct usb2000plus *d = context;
+    struct ooi *d = context;
     if (endpoint != COMMAND_OUT || d->halted)
         return -EPIPE;
     advance(d, now_ns);
@@ -433,7 +517,7 @@ static int on_out(void *context, uint8_t endpoint, int64_t now_ns, const uint8_t
     return execute(d, bytes, size, now_ns);
 }
 
-static int next_reply(struct usb2000plus *d, uint8_t *packet, int64_t *again_ns)
+static int next_reply(struct ooi *d, uint8_t *packet, int64_t *again_ns)
 {
     *again_ns = INT64_MAX;
     if (d->reply_count == 0)
@@ -445,17 +529,24 @@ static int next_reply(struct usb2000plus *d, uint8_t *packet, int64_t *again_ns)
     return (int)first.size;
 }
 
-static int next_packet(struct usb2000plus *d, int64_t now_ns, uint8_t *packet, int64_t *again_ns)
+static int next_packet(struct ooi *d, uint8_t endpoint, int64_t now_ns, uint8_t *packet,
+                       int64_t *again_ns)
 {
     *again_ns = d->integrating && d->requests > 0 ? d->ready_ns : INT64_MAX;
-    if (!d->loaded)
+    size_t *from = endpoint == APART_IN ? &d->apart.from : &d->rest.from;
+    size_t to = endpoint == APART_IN ? d->apart.to : d->rest.to;
+    if (!d->loaded || *from == to)
         return -EAGAIN;
+    if (d->stale) {
+        d->stale = false;
+        packet[0] = SYNC;
+        return 1;
+    }
     size_t most = d->options.full_speed ? 64 : 512;
-    size_t left = SPECTRUM_SIZE - d->sent;
-    size_t size = left < most ? left : most;
-    memcpy(packet, d->spectrum + d->sent, size);
-    d->sent += size;
-    if (d->sent == SPECTRUM_SIZE)
+    size_t size = to - *from < most ? to - *from : most;
+    memcpy(packet, d->spectrum + *from, size);
+    *from += size;
+    if (d->apart.from == d->apart.to && d->rest.from == d->rest.to)
         read_out(d, now_ns);
     return (int)size;
 }
@@ -463,33 +554,34 @@ static int next_packet(struct usb2000plus *d, int64_t now_ns, uint8_t *packet, i
 static int on_in(void *context, uint8_t endpoint, int64_t now_ns, uint8_t packet[USB_PACKET_MOST],
                  int64_t *again_ns)
 {
-    struct usb2000plus *d = context;
+    struct ooi *d = context;
     advance(d, now_ns);
     if (endpoint == REPLY_IN)
         return next_reply(d, packet, again_ns);
-    if (endpoint == SPECTRUM_IN)
-        return next_packet(d, now_ns, packet, again_ns);
+    if (endpoint == SPECTRUM_IN || endpoint == APART_IN)
+        return next_packet(d, endpoint, now_ns, packet, again_ns);
     *again_ns = INT64_MAX;
     return -EAGAIN;
 }
 
 static void on_clear_halt(void *context, uint8_t endpoint)
 {
-    struct usb2000plus *d = context;
+    struct ooi *d = context;
     if (endpoint == COMMAND_OUT)
         d->halted = false;
 }
 
-struct usb_model usb2000plus_model(struct usb2000plus *device)
+struct usb_model ooi_model(struct ooi *device)
 {
     return (struct usb_model){
         .context = device,
         .descriptors = device->descriptors,
         .descriptors_size = sizeof(device->descriptors),
-        .strings = {NULL, "Ocean Optics Inc.", "Ocean Optics USB2000+", device->serial},
+        .strings = {NULL, "Ocean Optics Inc.", device->kind->product_text, device->serial},
         .megabits = device->options.full_speed ? 12 : 480,
         .out = on_out,
         .in = on_in,
         .clear_halt = on_clear_halt,
+        .unplugged = power_on,
     };
 }
