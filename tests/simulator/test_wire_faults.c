@@ -112,12 +112,15 @@ static void a_deaf_spectrometer_keeps_its_integration_time(void **state)
 
 static void wait_until_gone(libusb_context *usb)
 {
-    libusb_device_handle *handle;
-    for (int i = 0; i < UNTIL_GONE && (handle = open_spectrometer(usb)) != NULL; i++) {
+    libusb_device_handle *handle = NULL;
+    for (int i = 0; i < UNTIL_GONE; i++) {
+        handle = libusb_open_device_with_vid_pid(usb, OCEAN_VENDOR, USB2000PLUS);
+        if (!handle)
+            return;
         libusb_close(handle);
         libusb_handle_events_timeout_completed(usb, &(struct timeval){0, 10000}, NULL);
     }
-    assert_null(open_spectrometer(usb));
+    fail_msg("still there");
 }
 
 static int number_of(const struct opened *o)

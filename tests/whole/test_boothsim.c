@@ -109,6 +109,29 @@ static void a_running_booth_leaves_what_the_product_needs(void **state)
     }
 }
 
+// Run in the booth's folder: the second calibration, the port in place of a line, and the ids
+// that the kernel would show of both spectrometers.
+static void a_scenario_chooses_the_instruments(void **state)
+{
+    (void)state;
+    char path[128], arguments[900];
+    snprintf(path, sizeof path, "%s/other.ini", folder);
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    fputs("[lamp1]\nname = A\nspectrum = A\n[spectrometer]\nmodel = hr4000\n"
+          "[spectrometer2]\nmodel = qe65000\nserial = EMUQE0001\n[inclinometer]\ntcp = yes\n",
+          file);
+    fclose(file);
+    snprintf(arguments, sizeof arguments,
+             "--scenario %s --run %s/other --no-xvfb -- sh -c 'cd %s/other && "
+             "test -s spectrometer2.cal && test -s inclinometer.port && ! test -e inclinometer && "
+             "cat /sys/bus/usb/devices/*/idProduct'",
+             path, folder, folder);
+    assert_int_equal(status_of(arguments), 0);
+    assert_true(said("1012"));
+    assert_true(said("1018"));
+}
+
 static void bad_input_ends_with_2_and_one_line(void **state)
 {
     (void)state;
@@ -201,6 +224,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_command_runs_on_its_own_screen_and_gives_the_exit_status),
         cmocka_unit_test(a_running_booth_leaves_what_the_product_needs),
+        cmocka_unit_test(a_scenario_chooses_the_instruments),
         cmocka_unit_test(bad_input_ends_with_2_and_one_line),
         cmocka_unit_test(help_and_version_are_there),
         cmocka_unit_test(a_booth_without_a_command_answers_until_it_is_told_to_stop),
