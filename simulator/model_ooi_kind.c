@@ -95,7 +95,7 @@ static const struct ooi_kind kinds[OOI_COUNT] = {
                                    {2303, DETECTOR_FILLER}},
                          .saturation = 64000,
                          .saturation_at = 0,
-                         .full = 65535,
+                         .full = 64000,
                          .least_us = 7200,
                          .most_us = 65000000,
                          .unit_us = 1,
