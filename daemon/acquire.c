@@ -135,7 +135,10 @@ static int64_t tracker_patience(const void *sample)
 
 static const char *spectrometer_note(const void *sample)
 {
-    return spectrometer_status_name(((const struct spectrum_sample *)sample)->status);
+    const struct spectrum_sample *s = sample;
+    if (s->status == SPECTROMETER_GOOD && s->dark_missing)
+        return "good, but no stored dark fits its exposure";
+    return spectrometer_status_name(s->status);
 }
 
 static const char *accelerometer_note(const void *sample)

@@ -365,6 +365,7 @@ static void fill(const struct spectrometer *s, const struct ocean_reading *readi
     out->peak = reading->peak;
     struct ocean_dark dark;
     bool known = ocean_dark_at(&s->darks, &s->unit, reading->integration_us, &dark);
+    out->dark_missing = *s->options.darks && !known; // the black pixels alone served
     const struct ocean_process process = {(enum bend)s->options.nonlinearity, s->options.boxcar,
                                           known ? &dark : NULL};
     ocean_irradiance(&s->unit, &s->axis, &process, reading, &out->irradiance, &out->sigma, NULL);

@@ -26,6 +26,7 @@ struct spectrum_sample {
     enum spectrometer_status status;
     int integration_us; // of this reading
     int averaged;       // readings averaged, >= 1
+    bool dark_missing; // stored darks were asked for, but none covers this exposure
     double peak;        // largest raw count over saturation, 0..1
     // W m-2 nm-1 on the inner grid; 0 where the instrument does not reach.
     struct spectrum irradiance;
