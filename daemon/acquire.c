@@ -11,7 +11,7 @@
 
 static const int64_t OPEN_WITHIN_NS = 3 * NS_PER_S;
 static const int64_t FIRST_REST_NS = 200 * NS_PER_MS;
-static const int64_t LONGEST_REST_NS = 5 * NS_PER_S;
+static const int64_t LONGEST_REST_NS = 2 * NS_PER_S; // who comes back is seen within it
 static const int64_t SILENT_AFTER_NS = 5 * NS_PER_S;  // without a sample it is reported
 static const int64_t REOPEN_AFTER_NS = 15 * NS_PER_S; // without a sample it is opened anew
 
