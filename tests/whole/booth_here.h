@@ -33,25 +33,35 @@ static inline pid_t child_of(pid_t parent, const char *name)
     return found;
 }
 
-// Starts both; scenario and settings are the shipped ones, then more lines.
+// Starts both; scenario and settings are the shipped ones, then more lines of the scenario and
+// boothd's arguments as a shell reads them, where $run is the run folder.
 static inline bool booth_open(struct booth_here *b, const char *more_scenario,
-                              const char *more_settings)
+                              const char *arguments)
 {
     static char shipped[8192], whole[16384];
-    char materials[512], run[256], config[256], scenario[256];
+    char materials[512], run[256], scenario[256], line[2048];
     folder_open(&b->folder);
     read_words("simulator/scenarios/booth.ini", shipped, sizeof shipped);
     snprintf(whole, sizeof whole, "%s\n%s", shipped, more_scenario);
     snprintf(scenario, sizeof scenario, "%s", folder_put(&b->folder, "booth.ini", whole));
     assert_non_null(realpath("config/materials", materials));
     read_words("config/booths/emulated.conf", shipped, sizeof shipped);
-    snprintf(whole, sizeof whole,
-             "%s\n[materials]\nfolder = %s\n[control]\nsocket = boothd.sock\n%s", shipped,
-             materials, more_settings);
-    snprintf(config, sizeof config, "%s", folder_put(&b->folder, "run/boothd.conf", whole));
+    snprintf(whole, sizeof whole, "%s\n[materials]\nfolder = %s\n[control]\nsocket = boothd.sock\n",
+             shipped, materials);
+    folder_put(&b->folder, "run/boothd.conf", whole);
     snprintf(run, sizeof run, "%s", folder_at(&b->folder, "run"));
-    const char *argv[] = {program_path("boothsim"), "--scenario", scenario, "--run", run, "--",
-                          program_path("boothd"),   "--config",   config,   NULL};
+    snprintf(line, sizeof line, "run=%s; exec %s --config $run/boothd.conf %s", run,
+             program_path("boothd"), arguments);
+    const char *argv[] = {program_path("boothsim"),
+                          "--scenario",
+                          scenario,
+                          "--run",
+                          run,
+                          "--",
+                          "/bin/sh",
+                          "-c",
+                          line,
+                          NULL};
     b->booth = start_program(argv, folder_at(&b->folder, "log"));
     struct control_client *client = connect_to(folder_at(&b->folder, "run/boothd.sock"), b->booth);
     control_close(client);
