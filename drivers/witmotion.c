@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/socket.h>
 
 #include "drivers/deadline.h"
 #include "drivers/udev.h"
@@ -51,6 +52,7 @@ struct accelerometer {
     struct accelerometer_options options;
     struct modbus_map map;
     modbus_t *modbus;
+    uint16_t transaction; // of the last request over TCP
     bool connected;
     char version[8];
     char serial[2 * SERIAL_WORDS + 1];
@@ -144,6 +146,33 @@ static bool set_timeouts(struct accelerometer *a, int64_t deadline_ns, struct er
     return true;
 }
 
+// "192.168.0.7:502" or "localhost:502": names are not looked up, since that
+// cannot be bounded in time.
+static bool is_tcp(const char *port)
+{
+    return *port != '/' && strchr(port, ':');
+}
+
+// libmodbus numbers all raw requests alike over TCP: a late answer would pass
+// for the one to the next request.
+static bool send_request(struct accelerometer *a, const uint8_t request[6])
+{
+    if (!is_tcp(a->options.port))
+        return modbus_send_raw_request(a->modbus, request, 6) >= 0;
+    a->transaction++;
+    uint8_t frame[12] = {a->transaction >> 8, a->transaction & 255, 0, 0, 0, 6};
+    memcpy(frame + 6, request, 6);
+    return send(modbus_get_socket(a->modbus), frame, sizeof frame, MSG_NOSIGNAL) == sizeof frame;
+}
+
+static bool check_transaction(const struct accelerometer *a, const uint8_t *reply,
+                              struct error *err)
+{
+    if (!is_tcp(a->options.port) || (reply[0] << 8 | reply[1]) == a->transaction)
+        return true;
+    return fail(err, ERROR_RETRY, "%s: the answer to another request", a->options.port);
+}
+
 // By raw frames, since libmodbus over TCP takes an answer of any unit.
 static bool read_registers(struct accelerometer *a, int first, int words, uint16_t *out,
                            int64_t deadline_ns, struct error *err)
@@ -158,25 +187,18 @@ static bool read_registers(struct accelerometer *a, int first, int words, uint16
     if (!set_timeouts(a, deadline_ns, err))
         return false;
     modbus_flush(a->modbus);
-    if (modbus_send_raw_request(a->modbus, request, sizeof request) < 0)
+    if (!send_request(a, request))
         return fail_modbus(a, err);
     int count = modbus_receive_confirmation(a->modbus, reply);
     if (count < 0)
         return fail_modbus(a, err);
     int header = modbus_get_header_length(a->modbus);
     const uint8_t *body = reply + header - 1;
-    if (!check_reply(a, body, count - header + 1, words, err))
+    if (!check_transaction(a, reply, err) || !check_reply(a, body, count - header + 1, words, err))
         return false;
     for (int i = 0; i < words; i++)
         out[i] = (uint16_t)(body[3 + 2 * i] << 8 | body[4 + 2 * i]);
     return true;
-}
-
-// "192.168.0.7:502" or "localhost:502": names are not looked up, since that
-// cannot be bounded in time.
-static bool is_tcp(const char *port)
-{
-    return *port != '/' && strchr(port, ':');
 }
 
 static modbus_t *new_tcp(const char *port, struct error *err)
