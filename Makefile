@@ -56,7 +56,7 @@ FAKES    := $(wildcard tests/fakes/*.c)
 SHADERS  := $(wildcard render/shaders/*.glsl colorimetry/*.glsl)
 object    = $(patsubst %,$(BUILD)/%.o,$(basename $(1)))
 
-.PHONY: FORCE all deps demo check check-here bench format layers links made install install-only uninstall clean
+.PHONY: FORCE all deps demo check check-here faults bench format layers links made install install-only uninstall clean
 .SECONDARY:
 
 all: $(PROGRAMS:%=$(BUILD)/%) made
@@ -128,13 +128,18 @@ check:
 	tests/run.sh --total $(BUILD)/results $(BUILD)/asan/results || failed=1; \
 	exit $$failed
 
-check-here: all $(TESTS:%.c=$(BUILD)/%) $(BUILD)/tests/bench/bench
+check-here: all $(BUILD)/tests/whole/faults $(BUILD)/tests/whole/soak $(TESTS:%.c=$(BUILD)/%) $(BUILD)/tests/bench/bench
 	BUILD=$(BUILD) tests/run.sh $(BUILD)/results $(TESTS:%.c=$(BUILD)/%)
 
 demo:
 	@$(MAKE) -s deps
 	$(MAKE) all
 	BUILD=$(BUILD) calibration/demo.sh $(BUILD)/demo
+
+# Every fault of docs/faults.md on running emulators, and two minutes over the
+# wire: some four minutes of real time, apart from check for that.
+faults: all $(BUILD)/tests/whole/faults $(BUILD)/tests/whole/soak
+	BUILD=$(BUILD) tests/run.sh $(BUILD)/faults.results $(BUILD)/tests/whole/faults $(BUILD)/tests/whole/soak
 
 bench: $(BUILD)/tests/bench/bench
 	$< $(BUILD)/bench.json
@@ -198,4 +203,4 @@ uninstall:
 clean:
 	rm -rf build
 
--include $(patsubst %,$(BUILD)/%.d,$(basename $(SOURCES) $(MAINS) $(TESTS) $(FAKES) tests/bench/bench.c))
+-include $(patsubst %,$(BUILD)/%.d,$(basename $(SOURCES) $(MAINS) $(TESTS) $(FAKES) tests/bench/bench.c tests/whole/faults.c tests/whole/soak.c))
