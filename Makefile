@@ -16,9 +16,9 @@ boothsim_in := simulator
 
 PACKAGES := git make gcc g++ libc6-dev pkg-config libusb-1.0-0-dev libudev-dev libmodbus-dev libhidapi-dev libiio-dev \
   libopencv-core-dev libopencv-calib3d-dev libceres-dev libopenexr-dev libglfw3-dev libepoxy-dev \
-  libegl-dev libgl1-mesa-dri libinih-dev libjansson-dev libpng-dev libmatio-dev libsystemd-dev \
+  libegl-dev libgl1-mesa-dri libinih-dev libjansson-dev libpng-dev libssl-dev libmatio-dev libsystemd-dev \
   libcmocka-dev libumockdev-dev umockdev xvfb xauth systemd psychtoolbox-3-common clang-format
-PKGS := libusb-1.0 libudev libmodbus hidapi-hidraw libiio OpenEXR glfw3 epoxy egl inih jansson libpng matio \
+PKGS := libusb-1.0 libudev libmodbus hidapi-hidraw libiio OpenEXR glfw3 epoxy egl inih jansson libpng libcrypto matio \
   libsystemd cmocka umockdev-1.0
 
 OPTIMISE := -O2
@@ -32,7 +32,7 @@ ALL_CXX   = -std=c++17 -D_GNU_SOURCE $(OPTIMISE) -g -fPIC -fopenmp -Wall -Wextra
 
 # What each folder may lean on outside the tree.
 base_libs        := -ljansson -lpthread -lm
-files_libs       := -linih -lOpenEXRCore-3_1 -lpng $(base_libs)
+files_libs       := -linih -lOpenEXRCore-3_1 -lpng -lcrypto $(base_libs)
 colorimetry_libs := -lm
 drivers_libs     := -lusb-1.0 -lmodbus -lhidapi-hidraw -liio -ludev -lopencv_calib3d -lopencv_core -lstdc++ -lm
 simulator_libs   := $(shell pkg-config --libs umockdev-1.0 2>/dev/null) -lmodbus -lutil -lm -lpthread
@@ -108,8 +108,9 @@ $(BUILD)/$(1): $(BUILD)/$($(1)_in)/$(1).o $(call archives,$($(1)_in) $(call belo
 endef
 $(foreach p,$(PROGRAMS),$(eval $(call program_rule,$(p))))
 
-$(BUILD)/tests/whole/%: $(BUILD)/tests/whole/%.o $(call object,$(FAKES)) $(call archives,base files colorimetry) $(PROGRAMS:%=$(BUILD)/%)
-	$(call say,LD $@)$(CC) -o $@ $< $(call object,$(FAKES)) $(call libs,base files colorimetry) -lcmocka
+# These alone may see both sides of a wire: drivers and simulator.
+$(BUILD)/tests/whole/%: $(BUILD)/tests/whole/%.o $(call object,$(FAKES)) $(call archives,$(FOLDERS)) $(PROGRAMS:%=$(BUILD)/%)
+	$(call say,LD $@)$(CC) -o $@ $< $(call object,$(FAKES)) $(call libs,$(FOLDERS)) -lcmocka
 
 $(call object,render/program.c): $(BUILD)/render/shaders_embedded.inc
 

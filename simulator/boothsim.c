@@ -312,11 +312,11 @@ static bool live(struct booth *b, int *status, struct error *err)
 // the process that answers for it goes.
 static void take_down(struct booth *b)
 {
-    child_end(&b->command, clock_now_ns() + stop_patience_ns);
+    child_stop(&b->command, clock_now_ns() + stop_patience_ns);
     control_unlisten(b->server);
     wire_stop(b->wire);
     xvfb_screen_close(&b->screen);
-    child_end(&b->xvfb, clock_now_ns() + stop_patience_ns);
+    child_stop(&b->xvfb, clock_now_ns() + stop_patience_ns);
     world_destroy(b->world);
 }
 

@@ -81,7 +81,7 @@ bool child_start_xvfb(const struct scenario *scenario, const char *run_dir, int6
                              : fail_errno(err, "starting Xvfb");
     close(ready[0]);
     if (!good) {
-        child_end(out, clock_now_ns() + NS_PER_S);
+        child_stop(out, clock_now_ns() + NS_PER_S);
         return while_doing(err, "see %s", log);
     }
     return true;
@@ -126,7 +126,7 @@ void child_signal(struct child *child, int signal)
         kill(child->pid, signal);
 }
 
-void child_end(struct child *child, int64_t deadline_ns)
+void child_stop(struct child *child, int64_t deadline_ns)
 {
     child_signal(child, SIGTERM);
     while (!child_has_ended(child)) {

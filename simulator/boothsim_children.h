@@ -34,6 +34,6 @@ bool child_has_ended(struct child *child);
 void child_signal(struct child *child, int signal);
 
 // Asks it to end, and kills it when it still runs at deadline_ns.
-void child_end(struct child *child, int64_t deadline_ns);
+void child_stop(struct child *child, int64_t deadline_ns);
 
 #endif

@@ -28,7 +28,7 @@ static struct vec3 on_head(const struct scenario_head *head, const struct mat3 *
     return vec3_add(eye, mat3_apply(*turn, vec3_add(origin, marker)));
 }
 
-void head_markers(const struct scenario_head *head, struct vec3 eye, struct vec3 at,
+void clip_markers(const struct scenario_head *head, struct vec3 eye, struct vec3 at,
                   struct vec3 out[3])
 {
     struct mat3 turn = head_turn(head, eye, at);

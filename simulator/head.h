@@ -20,7 +20,7 @@ struct mat3 head_turn(const struct scenario_head *head, struct vec3 eye, struct 
 
 // Places of the markers in the booth: top, middle, bottom of the clip; top,
 // left, right of the cap.
-void head_markers(const struct scenario_head *head, struct vec3 eye, struct vec3 at,
+void clip_markers(const struct scenario_head *head, struct vec3 eye, struct vec3 at,
                   struct vec3 out[3]);
 
 // Place of the fourth marker; false when none is worn.

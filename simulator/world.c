@@ -277,7 +277,7 @@ static void sense_markers(void *context, int64_t at_ns, struct vec3 out[3])
     struct world *w = context;
     struct world_state s = state_at(w, world_seconds(w, at_ns));
     struct easel easel = easel_at(&w->scenario.stand, s.tilt_deg);
-    head_markers(&w->scenario.head, s.eye, easel.centre, out);
+    clip_markers(&w->scenario.head, s.eye, easel.centre, out);
     for (int i = 0; i < 3; i++)
         out[i] = rigid_apply(w->camera_from_booth, out[i]);
 }

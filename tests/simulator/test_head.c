@@ -34,7 +34,7 @@ static void a_clip_has_its_markers_in_one_upright_plane(void **state)
     (void)state;
     struct scenario_head head = wearing(HEAD_CLIP);
     struct vec3 places[3];
-    head_markers(&head, eye, straight, places);
+    clip_markers(&head, eye, straight, places);
     expect_at(places[0], 0, 0.61 + 0.040, 0.67 - 0.030);
     expect_at(places[1], 0, 0.61, 0.67);
     expect_at(places[2], 0, 0.61 - 0.070, 0.67 - 0.080);
@@ -45,7 +45,7 @@ static void a_cap_has_one_on_top_and_two_below_it_at_the_sides(void **state)
     (void)state;
     struct scenario_head head = wearing(HEAD_CAP);
     struct vec3 places[3];
-    head_markers(&head, eye, straight, places);
+    clip_markers(&head, eye, straight, places);
     expect_at(places[0], 0, 0.61, 0.67);
     expect_at(places[1], -0.040, 0.61 - 0.060, 0.67 - 0.100);
     expect_at(places[2], 0.040, 0.61 - 0.060, 0.67 - 0.100);
@@ -61,7 +61,7 @@ static void a_fourth_marker_is_there_when_worn_and_turns_with_the_head(void **st
     assert_true(head_fourth_marker(&head, eye, straight, &place));
     expect_at(place, 0.06, 0.61 + 0.03, 0.67 - 0.02);
     assert_true(head_fourth_marker(&head, eye, aside, &place));
-    head_markers(&head, eye, aside, places);
+    clip_markers(&head, eye, aside, places);
     struct vec3 apart = vec3_sub(place, places[1]);
     assert_true(fabs(apart.x * apart.x + apart.y * apart.y + apart.z * apart.z - 0.0049) < 1e-9);
     assert_true(fabs(apart.x - 0.06) > 1e-4);

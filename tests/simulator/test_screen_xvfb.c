@@ -250,7 +250,7 @@ static void paint_and_look(int bits, uint32_t pixel, double r, double g, double 
     expect_pixel(32, 24, r, g, b);
     expect_pixel(63, 47, r, g, b);
     close(x);
-    child_end(&xvfb, clock_now_ns() + 60 * NS_PER_S);
+    child_stop(&xvfb, clock_now_ns() + 60 * NS_PER_S);
     assert_true(child_has_ended(&xvfb));
 }
 
@@ -305,7 +305,7 @@ static void a_command_that_will_not_end_is_killed(void **state)
     struct error err = {0};
     assert_true(child_start_command(line, -1, &child, &err));
     usleep(100000); // lets it set its trap; without it the test passes all the same
-    child_end(&child, clock_now_ns() + NS_PER_S / 10);
+    child_stop(&child, clock_now_ns() + NS_PER_S / 10);
     assert_true(child_has_ended(&child));
     assert_true(child.status == 128 + SIGKILL || child.status == 128 + SIGTERM);
 }
