@@ -3,11 +3,38 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "base/clock.h"
 
 static const int TIMEOUT_MS = 60000;
+
+bool bench_open(struct bench *b, const struct booth_settings *settings, const char *socket,
+                const char *booth, struct error *err)
+{
+    char path[128];
+    snprintf(path, sizeof path, "%s", socket ? socket : settings->control.socket);
+    *b = (struct bench){.terminal = isatty(STDERR_FILENO)};
+    if (!*path && !booth_socket_default(getenv("XDG_RUNTIME_DIR"), path, sizeof path, err))
+        return false;
+    if (!(b->daemon = control_connect(path, err)) ||
+        (booth && !(b->booth = control_connect(booth, err)))) {
+        bench_close(b);
+        return false;
+    }
+    b->readings = json_array();
+    return true;
+}
+
+void bench_close(struct bench *b)
+{
+    control_close(b->daemon);
+    control_close(b->booth);
+    json_decref(b->readings);
+    *b = (struct bench){0};
+}
 
 static bool done(json_t *reply)
 {

@@ -8,6 +8,7 @@
 #include "base/linear.h"
 #include "colorimetry/colour.h"
 #include "colorimetry/display.h"
+#include "config/booth.h"
 
 struct bench {
     struct control_client *daemon;
@@ -15,6 +16,16 @@ struct bench {
     json_t *readings;             // every reading is appended as it came
     bool terminal;                // progress is shown
 };
+
+// Connects to the boothd that runs with these settings, and to the emulated
+// booth whose control socket is booth (NULL: a person turns the knobs). socket:
+// boothd's control socket; NULL takes the settings', else the user's. readings
+// starts empty, terminal is whether standard error is one.
+bool bench_open(struct bench *b, const struct booth_settings *settings, const char *socket,
+                const char *booth, struct error *err);
+
+// Accepts a zeroed bench.
+void bench_close(struct bench *b);
 
 // ---- boothd ----------------------------------------------------------------
 

@@ -119,17 +119,11 @@ static bool check_paths(struct session *s, const struct options *o, struct error
 static bool begin(struct session *s, const struct options *o, struct error *err)
 {
     struct session_facts *f = s->facts;
-    char socket[128];
-    snprintf(socket, sizeof socket, "%s", o->socket ? o->socket : s->settings.control.socket);
     take_lamps(o, f);
     if (!check_paths(s, o, err) ||
-        (!*socket && !booth_socket_default(getenv("XDG_RUNTIME_DIR"), socket, sizeof socket, err)))
+        !bench_open(&s->bench, &s->settings, o->socket, o->booth, err))
         return false;
-    if (!(s->bench.daemon = control_connect(socket, err)) ||
-        (o->booth && !(s->bench.booth = control_connect(o->booth, err))))
-        return false;
-    s->bench.terminal = isatty(STDERR_FILENO);
-    s->bench.readings = f->readings = json_array();
+    f->readings = json_incref(s->bench.readings);
     snprintf(f->booth, sizeof f->booth, "%s", s->settings.booth.name);
     snprintf(f->software, sizeof f->software, "boothd %s", BOOTHD_VERSION);
     snprintf(f->observer, sizeof f->observer, "%s",
@@ -217,8 +211,7 @@ int command_session(int argc, char **argv)
                               .rehearse = o.rehearse};
         fine = run(s, &o, &err);
         all_reached = reached(facts);
-        control_close(s->bench.daemon);
-        control_close(s->bench.booth);
+        bench_close(&s->bench);
         json_decref(facts->settings);
         json_decref(facts->readings);
     }
