@@ -263,8 +263,28 @@ bool bench_truth(struct bench *b, const struct spectrum *reflectances, int count
     return true;
 }
 
-void bench_progress(const struct bench *b, const char *step, int at, int all)
+static void show_time_left(const struct bench *b, int at, int all)
 {
-    if (b->terminal)
-        fprintf(stderr, "\r\033[K%s: %d of %d%s", step, at, all, at == all ? "\n" : "");
+    double each_s = (double)(clock_now_ns() - b->step_ns) / NS_PER_S / (at - b->step_at);
+    int left = (int)ceil(each_s * (all - at));
+    if (left >= 60)
+        fprintf(stderr, ", %d min left", (left + 30) / 60);
+    else
+        fprintf(stderr, ", %d s left", left);
+}
+
+void bench_progress(struct bench *b, const char *step, int at, int all)
+{
+    if (!b->terminal)
+        return;
+    if (!b->step || strcmp(b->step, step) || at < b->step_at) {
+        b->step = step;
+        b->step_ns = clock_now_ns();
+        b->step_at = at;
+    }
+    fprintf(stderr, "\r\033[K%s: %d of %d", step, at, all);
+    if (at > b->step_at && at < all)
+        show_time_left(b, at, all);
+    if (at >= all)
+        fputc('\n', stderr);
 }

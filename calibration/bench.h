@@ -15,6 +15,9 @@ struct bench {
     struct control_client *booth; // NULL: a person turns the knobs
     json_t *readings;             // every reading is appended as it came
     bool terminal;                // progress is shown
+    const char *step;             // of bench_progress, with its start: time and how far
+    int64_t step_ns;
+    int step_at;
 };
 
 // Connects to the boothd that runs with these settings, and to the emulated
@@ -79,7 +82,8 @@ bool bench_aim_ceiling(struct bench *b, double x_m, double z_m, struct error *er
 bool bench_truth(struct bench *b, const struct spectrum *reflectances, int count, struct xyz *out,
                  struct error *err);
 
-// Shows "step: done of all" on a terminal.
-void bench_progress(const struct bench *b, const char *step, int done, int all);
+// Shows "step: done of all" on a terminal, and how long the rest will take at
+// the pace of this step so far.
+void bench_progress(struct bench *b, const char *step, int done, int all);
 
 #endif

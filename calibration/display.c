@@ -9,6 +9,7 @@
 
 #include "calibration/commands.h"
 #include "calibration/display_fit.h"
+#include "calibration/display_measure.h"
 #include "calibration/lines.h"
 #include "config/display_file.h"
 
@@ -329,6 +330,29 @@ static int command_inverse(int argc, char **argv)
 int command_display(int argc, char **argv)
 {
     static const struct command TABLE[] = {
+        {"measure", display_measure, "--config FILE -o FOLDER [OPTION]...",
+         "Measures a display through the running boothd into FOLDER: display.ti3 to fit,\n"
+         "      verify.ti3 to check with, display.journal with every reading; goes on where an\n"
+         "      interrupted run ended.\n"
+         "\n"
+         "  --config FILE       boothd's settings\n"
+         "  --socket PATH       boothd's control socket (default: the settings', else the user's)\n"
+         "  --booth PATH        control socket of an emulated booth\n"
+         "  --steps N           levels of each ramp, 4..64 (16); twice as many greys\n"
+         "  --near-black N      colours below code 16, 0..200 (12)\n"
+         "  --random N          colours in between, 0..2000 (60)\n"
+         "  --verify N          colours kept apart for checking, 1..1000 (40)\n"
+         "  --white-every N     patches between two whites, 5..200 (25)\n"
+         "  --seed N            of colours and order (20040912)\n"
+         "  --warm-up S         longest wait until white stands still, 0..14400 s (1800)\n"
+         "  --warm-up-window S  over which it must stand still, 1..3600 s (120)\n"
+         "  --settle S          wait after showing a patch, 0..10 s (found by measuring)\n"
+         "  --json              what was found as one JSON object\n"
+         "  -o, --out FOLDER    made when missing\n"
+         "  --help\n"
+         "\n"
+         "Exit 3: done, with a warning (the display was not warm or not settled, white drifted\n"
+         "by more than 3 %)."},
         {"fit", command_fit, "TRAIN.ti3 -o D.ini",
          "Fits three curves and a 3x4 matrix to measured patches.\n"
          "\n"

@@ -5,12 +5,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/clock.h"
-#include "files/cgats.h"
+#include "calibration/statistics.h"
 
 static const double FULL = 255;
 
-enum { GREYS = 2 }; // greys a step of the ramps: errors of a neutral are seen first
+enum {
+    GREYS = 2,      // greys a step of the ramps: errors of a neutral are seen first
+    NEAR_BLACK = 16 // codes: below it a ramp's steps are wide
+};
 
 // SplitMix64 (Steele, Lea, Flood 2014).
 static uint64_t next_random(uint64_t *state)
@@ -68,31 +70,58 @@ static void add_ramps(struct patch_set *set, int steps)
     add(set, 0, 0, 0);
 }
 
-bool patch_set_characterise(int ramp_steps, int random, int white_every, uint64_t seed,
-                            struct patch_set *out, struct error *err)
+static void add_near_black(struct patch_set *set, int count, uint64_t *state)
 {
-    int body = (3 + GREYS) * ramp_steps + 1 + random;
+    for (int i = 0; i < count; i++) {
+        double r = uniform(state), g = uniform(state), b = uniform(state);
+        add(set, r * NEAR_BLACK / FULL, g * NEAR_BLACK / FULL, b * NEAR_BLACK / FULL);
+    }
+}
+
+static void add_random(struct patch_set *set, int count, uint64_t *state)
+{
+    for (int i = 0; i < count; i++) {
+        double r = uniform(state), g = uniform(state), b = uniform(state);
+        double grey = (r + g + b) / 3, pull = i % 3 ? 0.6 : 0; // surfaces are seldom saturated
+        add(set, r + pull * (grey - r), g + pull * (grey - g), b + pull * (grey - b));
+    }
+}
+
+// With white and black in between.
+static void interleave(const struct patch_set *plain, int white_every, struct patch_set *out)
+{
+    for (int i = 0; i < plain->count; i++) {
+        if (i % white_every == 0) {
+            add(out, 1, 1, 1);
+            if (i / white_every % 2)
+                add(out, 0, 0, 0);
+        }
+        out->patches[out->count++] = plain->patches[i];
+    }
+    add(out, 1, 1, 1);
+}
+
+bool patch_set_characterise(const struct patch_sizes *z, uint64_t seed, struct patch_set *out,
+                            struct error *err)
+{
+    if (z->ramp_steps < 1 || z->near_black < 0 || z->random < 0 || z->white_every < 1)
+        return fail(err, ERROR_RANGE,
+                    "no patch set of %d steps, %d near black, %d random, white every %d",
+                    z->ramp_steps, z->near_black, z->random, z->white_every);
+    int body = (3 + GREYS) * z->ramp_steps + 1 + z->near_black + z->random;
     struct patch_set plain = {.patches = calloc((size_t)body, sizeof *plain.patches)};
-    struct patch_set set = {.patches = calloc((size_t)(2 * body + 2), sizeof *set.patches)};
-    if (!plain.patches || !set.patches || white_every < 1) {
+    struct patch_set set = {.patches = calloc((size_t)(3 * body + 2), sizeof *set.patches)};
+    if (!plain.patches || !set.patches) {
         patch_set_fini(&plain);
         patch_set_fini(&set);
-        return fail(err, ERROR_RANGE, "no patch set of %d patches", body);
+        return fail(err, ERROR_SYSTEM, "out of memory for %d patches", body);
     }
     uint64_t state = seed;
-    add_ramps(&plain, ramp_steps);
-    for (int i = 0; i < random; i++) {
-        double r = uniform(&state), g = uniform(&state), b = uniform(&state);
-        double grey = (r + g + b) / 3, pull = i % 3 ? 0.6 : 0; // surfaces are seldom saturated
-        add(&plain, r + pull * (grey - r), g + pull * (grey - g), b + pull * (grey - b));
-    }
+    add_ramps(&plain, z->ramp_steps);
+    add_random(&plain, z->random, &state);
+    add_near_black(&plain, z->near_black, &state);
     shuffle(plain.patches, plain.count, &state);
-    for (int i = 0; i < plain.count; i++) {
-        if (i % white_every == 0)
-            add(&set, 1, 1, 1);
-        set.patches[set.count++] = plain.patches[i];
-    }
-    add(&set, 1, 1, 1);
+    interleave(&plain, z->white_every, &set);
     patch_set_fini(&plain);
     *out = set;
     return true;
@@ -114,9 +143,9 @@ bool patch_set_verify(int random, uint64_t seed, struct patch_set *out, struct e
     return true;
 }
 
-static bool is_white(const struct display_patch *p)
+static bool is_grey(const struct display_patch *p, double level)
 {
-    return p->counts.r == 1 && p->counts.g == 1 && p->counts.b == 1;
+    return p->counts.r == level && p->counts.g == level && p->counts.b == level;
 }
 
 bool patch_set_white(const struct patch_set *set, struct xyz *white)
@@ -124,7 +153,7 @@ bool patch_set_white(const struct patch_set *set, struct xyz *white)
     struct xyz sum = {0};
     int n = 0;
     for (int i = 0; i < set->count; i++) {
-        if (!is_white(&set->patches[i]))
+        if (!is_grey(&set->patches[i], 1))
             continue;
         sum.X += set->patches[i].xyz.X;
         sum.Y += set->patches[i].xyz.Y;
@@ -137,56 +166,45 @@ bool patch_set_white(const struct patch_set *set, struct xyz *white)
     return true;
 }
 
-double patch_set_white_drift(const struct patch_set *set)
+// Hours and luminances of the greys of a level; returns how many.
+static int greys_over_time(const struct patch_set *set, double level, double *hours, double *Y)
 {
-    double least = INFINITY, most = 0;
-    for (int i = 0; i < set->count; i++) {
-        if (!is_white(&set->patches[i]))
-            continue;
-        least = fmin(least, set->patches[i].xyz.Y);
-        most = fmax(most, set->patches[i].xyz.Y);
-    }
-    return least < most ? most / least - 1 : 0;
+    int n = 0;
+    for (int i = 0; i < set->count; i++)
+        if (is_grey(&set->patches[i], level)) {
+            hours[n] = set->patches[i].elapsed_s / 3600;
+            Y[n++] = set->patches[i].xyz.Y;
+        }
+    return n;
 }
 
-static void fill_row(const struct display_patch *p, double k, double row[6])
+static double range_of(const double *values, int n)
 {
-    const double v[6] = {100 * p->counts.r, 100 * p->counts.g, 100 * p->counts.b,
-                         k * p->xyz.X,      k * p->xyz.Y,      k * p->xyz.Z};
-    memcpy(row, v, sizeof v);
+    double least = INFINITY, most = -INFINITY;
+    for (int i = 0; i < n; i++) {
+        least = fmin(least, values[i]);
+        most = fmax(most, values[i]);
+    }
+    return n ? most - least : 0;
 }
 
-bool patch_set_save(const struct patch_set *set, const char *path, struct xyz white,
-                    const char *instrument, struct error *err)
+struct patch_drift patch_set_drift(const struct patch_set *set)
 {
-    char luminance[96], created[21], by[64];
-    snprintf(luminance, sizeof luminance, "%.6f %.6f %.6f", white.X, white.Y, white.Z);
-    snprintf(by, sizeof by, "boothd %s", BOOTHD_VERSION);
-    clock_utc(created);
-    struct cgats_keyword keywords[] = {
-        {"DESCRIPTOR", "Display characterisation", 0}, {"ORIGINATOR", by, 0},
-        {"CREATED", created, 0},                       {"DEVICE_CLASS", "DISPLAY", 0},
-        {"COLOR_REP", "RGB_XYZ", 0},                   {"TARGET_INSTRUMENT", (char *)instrument, 0},
-        {"INSTRUMENT_TYPE_SPECTRAL", "YES", 0},        {"LUMINANCE_XYZ_CDM2", luminance, 0},
-        {"NORMALIZED_TO_Y_100", "YES", 0},
-    };
-    char *names[] = {"RGB_R", "RGB_G", "RGB_B", "XYZ_X", "XYZ_Y", "XYZ_Z"};
-    struct cgats file = {.identifier = "CTI3",
-                         .keyword_count = sizeof keywords / sizeof *keywords,
-                         .keywords = keywords,
-                         .table = {.columns = 6, .rows = (size_t)set->count, .names = names}};
-    file.table.values = malloc((size_t)set->count * 6 * sizeof(double));
-    file.table.labels = calloc((size_t)set->count, sizeof(char *));
-    char(*ids)[16] = calloc((size_t)set->count, sizeof *ids);
-    bool saved = file.table.values && file.table.labels && ids;
-    for (int i = 0; saved && i < set->count; i++) {
-        fill_row(&set->patches[i], 100 / white.Y, file.table.values + 6 * i);
-        snprintf(ids[i], sizeof ids[i], "%d", i + 1);
-        file.table.labels[i] = ids[i];
+    struct patch_drift d = {0};
+    double *hours = calloc((size_t)(2 * set->count) + 1, sizeof *hours);
+    if (!hours)
+        return d;
+    double *Y = hours + set->count;
+    d.blacks = greys_over_time(set, 0, hours, Y);
+    d.black_cdm2 = range_of(Y, d.blacks);
+    d.whites = greys_over_time(set, 1, hours, Y);
+    double mean = summarise(Y, d.whites).mean;
+    if (mean > 0) {
+        struct line_fit line = line_through(hours, Y, d.whites);
+        d.white = range_of(Y, d.whites) / mean;
+        d.white_per_hour = line.slope / mean;
+        d.white_per_hour_u = line.slope_u / mean;
     }
-    saved = saved ? cgats_save(path, &file, err) : fail(err, ERROR_SYSTEM, "out of memory");
-    free(file.table.values);
-    free(file.table.labels);
-    free(ids);
-    return saved;
+    free(hours);
+    return d;
 }

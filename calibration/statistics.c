@@ -43,3 +43,25 @@ struct summary summarise(const double *values, int n)
     free(sorted);
     return s;
 }
+
+struct line_fit line_through(const double *x, const double *y, int n)
+{
+    struct line_fit f = {0};
+    double xx = 0, xy = 0, off = 0;
+    for (int i = 0; i < n; i++) {
+        f.mean_x += x[i] / n;
+        f.at_mean += y[i] / n;
+    }
+    for (int i = 0; i < n; i++) {
+        xx += (x[i] - f.mean_x) * (x[i] - f.mean_x);
+        xy += (x[i] - f.mean_x) * (y[i] - f.at_mean);
+    }
+    if (n < 2 || !(xx > 0))
+        return (struct line_fit){0};
+    f.slope = xy / xx;
+    for (int i = 0; i < n; i++)
+        off += pow(y[i] - f.at_mean - f.slope * (x[i] - f.mean_x), 2);
+    f.scatter = n > 2 ? sqrt(off / (n - 2)) : 0;
+    f.slope_u = f.scatter / sqrt(xx);
+    return f;
+}

@@ -7,6 +7,7 @@
 
 #include "calibration/measurements.h"
 #include "calibration/patches.h"
+#include "files/cgats.h"
 
 // cmocka defines a macro named fail: it comes last.
 #include <setjmp.h>
@@ -28,7 +29,7 @@ static void every_count_of_a_set_is_an_8_bit_code(void **state)
 {
     (void)state;
     struct patch_set set;
-    assert_true(patch_set_characterise(16, 60, 25, 7, &set, NULL));
+    assert_true(patch_set_characterise(&(struct patch_sizes){16, 6, 60, 25}, 7, &set, NULL));
     for (int i = 0; i < set.count; i++)
         assert_true(is_8_bit(set.patches[i].counts.r) && is_8_bit(set.patches[i].counts.g) &&
                     is_8_bit(set.patches[i].counts.b));
@@ -39,7 +40,7 @@ static void white_opens_closes_and_recurs(void **state)
 {
     (void)state;
     struct patch_set set;
-    assert_true(patch_set_characterise(16, 60, 25, 7, &set, NULL));
+    assert_true(patch_set_characterise(&(struct patch_sizes){16, 6, 60, 25}, 7, &set, NULL));
     int whites = 0, since = 0;
     for (int i = 0; i < set.count; i++, since++) {
         struct counts c = set.patches[i].counts;
@@ -47,7 +48,7 @@ static void white_opens_closes_and_recurs(void **state)
             whites++;
             since = 0;
         }
-        assert_true(since <= 25);
+        assert_true(since <= 26); // a black may come between
     }
     assert_true(whites >= 5);
     assert_float_equal(set.patches[0].counts.g, 1, CODE);
@@ -59,9 +60,9 @@ static void the_same_seed_gives_the_same_order_and_another_seed_another(void **s
 {
     (void)state;
     struct patch_set a, b, c;
-    assert_true(patch_set_characterise(8, 20, 25, 7, &a, NULL));
-    assert_true(patch_set_characterise(8, 20, 25, 7, &b, NULL));
-    assert_true(patch_set_characterise(8, 20, 25, 8, &c, NULL));
+    assert_true(patch_set_characterise(&(struct patch_sizes){8, 6, 20, 25}, 7, &a, NULL));
+    assert_true(patch_set_characterise(&(struct patch_sizes){8, 6, 20, 25}, 7, &b, NULL));
+    assert_true(patch_set_characterise(&(struct patch_sizes){8, 6, 20, 25}, 8, &c, NULL));
     assert_memory_equal(a.patches, b.patches, (size_t)a.count * sizeof *a.patches);
     assert_memory_not_equal(a.patches, c.patches, (size_t)a.count * sizeof *a.patches);
     patch_set_fini(&a);
@@ -87,10 +88,10 @@ static void a_saved_set_is_read_back_in_absolute_units(void **state)
     struct xyz white;
     char path[] = "/tmp/patches-XXXXXX";
     close(mkstemp(path));
-    assert_true(patch_set_characterise(8, 20, 25, 7, &set, NULL));
+    assert_true(patch_set_characterise(&(struct patch_sizes){8, 6, 20, 25}, 7, &set, NULL));
     measure_by_formula(&set);
     assert_true(patch_set_white(&set, &white));
-    assert_true(patch_set_save(&set, path, white, "PR-655 test", NULL));
+    assert_true(patch_set_save(&set, path, white, "PR-655 test", NULL, NULL));
     assert_true(measurements_load(path, &m, NULL));
     assert_int_equal(m.count, set.count);
     for (int i = 0; i < set.count; i++) {
@@ -102,15 +103,74 @@ static void a_saved_set_is_read_back_in_absolute_units(void **state)
     unlink(path);
 }
 
-static void drift_is_the_spread_of_the_repeated_whites(void **state)
+static void spectra_go_along_where_every_patch_has_one(void **state)
 {
     (void)state;
     struct patch_set set;
-    assert_true(patch_set_characterise(8, 20, 10, 7, &set, NULL));
+    struct cgats file;
+    char path[] = "/tmp/patches-XXXXXX";
+    close(mkstemp(path));
+    assert_true(patch_set_characterise(&(struct patch_sizes){4, 0, 2, 25}, 7, &set, NULL));
     measure_by_formula(&set);
-    assert_float_equal(patch_set_white_drift(&set), 0, CODE);
-    set.patches[0].xyz.Y *= 1.04;
-    assert_float_equal(patch_set_white_drift(&set), 0.04, CODE);
+    json_t *readings = json_array();
+    for (int i = 0; i < set.count; i++) {
+        set.patches[i].reading = i;
+        json_array_append_new(readings, json_pack("{s:[i,i,i],s:[f,f,f]}", "nm", 380, 580, 780, "values",
+                                                  0.001 * i, 0.002, 0.003));
+    }
+    assert_true(patch_set_save(&set, path, (struct xyz){950, 1000, 1090}, "x", readings, NULL));
+    assert_true(cgats_load_as(path, "CTI3", &file, NULL));
+    assert_string_equal(cgats_keyword(&file, "SPECTRAL_BANDS"), "3");
+    int first = table_column(&file.table, "SPEC_380");
+    assert_true(first > 0 && table_column(&file.table, "SPEC_780") == first + 2);
+    assert_float_equal(table_at(&file.table, 5, (size_t)first), 5, WRITTEN); // mW
+    cgats_fini(&file);
+    json_array_remove(readings, 0); // one short: none is written
+    assert_true(patch_set_save(&set, path, (struct xyz){950, 1000, 1090}, "x", readings, NULL));
+    assert_true(cgats_load_as(path, "CTI3", &file, NULL));
+    assert_true(table_column(&file.table, "SPEC_380") < 0);
+    cgats_fini(&file);
+    json_decref(readings);
+    patch_set_fini(&set);
+    unlink(path);
+}
+
+static void near_black_colours_lie_below_code_sixteen(void **state)
+{
+    (void)state;
+    struct patch_set with, without;
+    assert_true(patch_set_characterise(&(struct patch_sizes){4, 30, 0, 200}, 7, &with, NULL));
+    assert_true(patch_set_characterise(&(struct patch_sizes){4, 0, 0, 200}, 7, &without, NULL));
+    int dark[2] = {0, 0};
+    const struct patch_set *sets[] = {&with, &without};
+    for (int k = 0; k < 2; k++)
+        for (int i = 0; i < sets[k]->count; i++) {
+            struct counts c = sets[k]->patches[i].counts;
+            dark[k] += fmax(c.r, fmax(c.g, c.b)) <= 16.0 / 255;
+        }
+    assert_int_equal(dark[0] - dark[1], 30);
+    patch_set_fini(&with);
+    patch_set_fini(&without);
+}
+
+static void drift_is_the_spread_and_the_slope_of_the_repeated_whites(void **state)
+{
+    (void)state;
+    static const double PER_HOUR = 0.05;
+    struct patch_set set;
+    assert_true(patch_set_characterise(&(struct patch_sizes){8, 0, 20, 10}, 7, &set, NULL));
+    measure_by_formula(&set);
+    assert_float_equal(patch_set_drift(&set).white, 0, CODE);
+    for (int i = 0; i < set.count; i++) {
+        set.patches[i].elapsed_s = 36.0 * i;
+        set.patches[i].xyz.Y *= 1 + PER_HOUR * 0.01 * i;
+    }
+    struct patch_drift d = patch_set_drift(&set);
+    double span = PER_HOUR * 0.01 * (set.count - 1), mid = 1 + span / 2;
+    assert_true(d.whites >= 5 && d.blacks >= 3);
+    assert_float_equal(d.white, span / mid, 0.002); // the whites do not lie quite evenly
+    assert_float_equal(d.white_per_hour, PER_HOUR / mid, 0.001);
+    assert_true(d.white_per_hour_u < 1e-9);
     patch_set_fini(&set);
 }
 
@@ -121,7 +181,9 @@ int main(void)
         cmocka_unit_test(white_opens_closes_and_recurs),
         cmocka_unit_test(the_same_seed_gives_the_same_order_and_another_seed_another),
         cmocka_unit_test(a_saved_set_is_read_back_in_absolute_units),
-        cmocka_unit_test(drift_is_the_spread_of_the_repeated_whites),
+        cmocka_unit_test(spectra_go_along_where_every_patch_has_one),
+        cmocka_unit_test(near_black_colours_lie_below_code_sixteen),
+        cmocka_unit_test(drift_is_the_spread_and_the_slope_of_the_repeated_whites),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
