@@ -11,6 +11,7 @@
 #include "base/clock.h"
 #include "simulator/wire_device.h"
 #include "simulator/wire_fault.h"
+#include "simulator/wire_uevent.h"
 
 enum { REPORTS = 64 }; // as the kernel's hidraw keeps for a reader
 enum { FLOOD_TIMES = 50, OTHER_REPORT = 0x3D };
@@ -231,23 +232,24 @@ static bool add(struct hid_device_emulated *d,
     return wire_device_add(&d->wire, text, err);
 }
 
-static void syspath(char sys[256], const char *path)
-{
-    snprintf(sys, 256, "/sys%s", path);
-}
-
-static void uevent(struct hid_device_emulated *d, const char *path, const char *action)
+static void tell(struct hid_device_emulated *d, const char *path, const char *action)
 {
     char sys[256];
-    syspath(sys, path);
-    umockdev_testbed_uevent(d->wire.testbed, sys, action);
+    bool raw = path == d->hidraw_path;
+    snprintf(sys, sizeof(sys), "/sys%s", path);
+    struct uevent uevent = {.sysfs = sys,
+                            .subsystem = raw ? "hidraw" : "hid",
+                            .devnode = raw ? d->wire.devnode : NULL,
+                            .major_number = d->wire.node.major_number,
+                            .minor_number = d->wire.node.minor_number};
+    uevent_tell(d->wire.testbed, &uevent, action);
 }
 
 static void remove_from_sysfs(struct hid_device_emulated *d, const char *path)
 {
     char sys[256];
-    syspath(sys, path);
-    umockdev_testbed_uevent(d->wire.testbed, sys, "remove");
+    snprintf(sys, sizeof(sys), "/sys%s", path);
+    tell(d, path, "remove");
     umockdev_testbed_remove_device(d->wire.testbed, sys);
 }
 
@@ -256,8 +258,8 @@ static bool show(struct hid_device_emulated *d, struct error *err)
     if (!add(d, describe_hid, err) || !add(d, describe_hidraw, err) ||
         !node_link(&d->wire.node, d->wire.testbed, d->wire.devnode, err))
         return false;
-    uevent(d, d->hid_path, "add");
-    uevent(d, d->hidraw_path, "add");
+    tell(d, d->hid_path, "add");
+    tell(d, d->hidraw_path, "add");
     return true;
 }
 

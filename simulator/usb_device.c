@@ -11,6 +11,7 @@
 #include "simulator/usb_place.h"
 #include "simulator/wire_device.h"
 #include "simulator/wire_fault.h"
+#include "simulator/wire_uevent.h"
 
 enum { URBS = 64, SETUP_SIZE = 8 };
 enum { FULL_PACKETS_TO_PULL = 2 };
@@ -375,6 +376,13 @@ static void on_vanished(UMockdevIoctlBase *handler, UMockdevIoctlClient *client,
 
 // ---- the plug ----------------------------------------------------------------------
 
+static void tell(struct usb_device *d, const char *action)
+{
+    struct uevent uevent = {d->place.sysfs,   "usb",     "usb_device",
+                            d->place.devnode, USB_MAJOR, usb_place_minor(&d->place)};
+    uevent_tell(d->wire.testbed, &uevent, action);
+}
+
 static bool show(struct usb_device *d, struct error *err)
 {
     GString *text = g_string_new(NULL);
@@ -383,13 +391,13 @@ static bool show(struct usb_device *d, struct error *err)
         !node_link(&d->wire.node, d->wire.testbed, d->wire.devnode, err))
         return false;
     d->shown = true;
-    umockdev_testbed_uevent(d->wire.testbed, d->place.sysfs, "add");
+    tell(d, "add");
     return true;
 }
 
 static void withdraw(struct usb_device *d)
 {
-    umockdev_testbed_uevent(d->wire.testbed, d->place.sysfs, "remove");
+    tell(d, "remove");
     umockdev_testbed_remove_device(d->wire.testbed, d->place.sysfs);
     node_forget_number(d->wire.testbed, USB_MAJOR, usb_place_minor(&d->place));
     wire_device_hide(&d->wire);
