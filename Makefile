@@ -129,18 +129,20 @@ check:
 	tests/run.sh --total $(BUILD)/results $(BUILD)/asan/results || failed=1; \
 	exit $$failed
 
-check-here: all $(BUILD)/tests/whole/faults $(BUILD)/tests/whole/soak $(TESTS:%.c=$(BUILD)/%) $(BUILD)/tests/bench/bench
-	BUILD=$(BUILD) tests/run.sh $(BUILD)/results $(TESTS:%.c=$(BUILD)/%)
+# Last and beside each other those that mostly wait: every fault of
+# docs/faults.md on running emulators, and two minutes over the wire.
+LONG := $(BUILD)/tests/whole/faults $(BUILD)/tests/whole/soak
+
+check-here: all $(TESTS:%.c=$(BUILD)/%) $(LONG) $(BUILD)/tests/bench/bench
+	BUILD=$(BUILD) tests/run.sh $(BUILD)/results $(TESTS:%.c=$(BUILD)/%) --together $(LONG)
 
 demo:
 	@$(MAKE) -s deps
 	$(MAKE) all
 	BUILD=$(BUILD) calibration/demo.sh $(BUILD)/demo
 
-# Every fault of docs/faults.md on running emulators, and two minutes over the
-# wire: some four minutes of real time, apart from check for that.
-faults: all $(BUILD)/tests/whole/faults $(BUILD)/tests/whole/soak
-	BUILD=$(BUILD) tests/run.sh $(BUILD)/faults.results $(BUILD)/tests/whole/faults $(BUILD)/tests/whole/soak
+faults: all $(LONG)
+	BUILD=$(BUILD) tests/run.sh $(BUILD)/faults.results --together $(LONG)
 
 bench: $(BUILD)/tests/bench/bench
 	$< $(BUILD)/bench.json

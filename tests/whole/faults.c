@@ -397,27 +397,13 @@ static void run_asked(struct lane *lane, struct row *row)
     changes_logged(lane, row, from);
 }
 
-// umockdev 0.17 ends boothsim when it tells of a device while a listener goes away, as one does
-// whenever a spectrometer is looked for: no two that are told of fail at once.
-static pthread_mutex_t told_of = PTHREAD_MUTEX_INITIALIZER;
-
-static void run_alone(struct lane *lane, struct row *row)
-{
-    pthread_mutex_lock(&told_of);
-    run_polled(lane, row);
-    pthread_mutex_unlock(&told_of);
-}
-
 static void *run_lane(void *argument)
 {
     struct lane *lane = argument;
-    bool alone = !strcmp(lane->label, SPECTROMETER) || !strcmp(lane->label, CAMERA);
     for (int i = 0; i < ROWS; i++)
         if (!strcmp(rows[i].instrument, lane->label)) {
             if (rows[i].effect == FAILS)
                 run_asked(lane, &rows[i]);
-            else if (alone)
-                run_alone(lane, &rows[i]);
             else
                 run_polled(lane, &rows[i]);
         }
