@@ -22,6 +22,7 @@
 #define CONTROL_MEASURE "measure" // -> XYZ cd/m2, spectrum, instrument, age
 #define CONTROL_PROBE "probe"     // x_px, y_px -> reference XYZ and counts of that pixel
 #define CONTROL_TEACH "teach"     // lamp, readings -> averaged spectrum of the lamp now on
+#define CONTROL_RAW "raw"         // [integration_us], readings -> raw counts of the spectrometer
 #define CONTROL_RELOAD "reload"   // load display, lamps and booth settings again
 #define CONTROL_QUIT "quit"
 

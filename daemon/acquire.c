@@ -11,7 +11,7 @@
 
 static const int64_t OPEN_WITHIN_NS = 3 * NS_PER_S;
 static const int64_t FIRST_REST_NS = 200 * NS_PER_MS;
-static const int64_t LONGEST_REST_NS = 2 * NS_PER_S; // who comes back is seen within it
+static const int64_t LONGEST_REST_NS = 2 * NS_PER_S;  // who comes back is seen within it
 static const int64_t SILENT_AFTER_NS = 5 * NS_PER_S;  // without a sample it is reported
 static const int64_t REOPEN_AFTER_NS = 15 * NS_PER_S; // without a sample it is opened anew
 
@@ -48,9 +48,19 @@ struct worker {
     union any_sample sample;
 };
 
+// A request for a series and its answer, between two threads.
+struct series_desk {
+    pthread_mutex_t lock;
+    uint64_t asked, begun, answered; // numbers of requests
+    struct series_wanted wanted;
+    struct series done;
+    struct error err;
+};
+
 struct acquire {
     struct acquire_from from;
     struct worker workers[POLLED];
+    struct series_desk series;
     pthread_mutex_t lock;
     pthread_cond_t wake;
     bool stop; // under lock
@@ -220,13 +230,103 @@ static void deliver(struct worker *w)
     change(w, INSTRUMENT_IS_RUNNING, NULL);
 }
 
+// ---- series of raw readings ----------------------------------------------------
+
+static bool series_asked(struct acquire *a, struct series_wanted *out, uint64_t *number)
+{
+    struct series_desk *d = &a->series;
+    pthread_mutex_lock(&d->lock);
+    bool asked = d->asked != d->begun;
+    d->begun = *number = d->asked;
+    *out = d->wanted;
+    pthread_mutex_unlock(&d->lock);
+    return asked;
+}
+
+static void answer_series(struct acquire *a, uint64_t number, const struct series *done,
+                          const struct error *err)
+{
+    struct series_desk *d = &a->series;
+    pthread_mutex_lock(&d->lock);
+    d->answered = number;
+    d->err = *err;
+    if (done)
+        d->done = *done;
+    pthread_mutex_unlock(&d->lock);
+}
+
+// One reading that counts; those exposed before the request do not.
+static bool take_counts(struct worker *w, void *device, const struct series_wanted *wanted,
+                        struct spectrum_counts *out, struct error *err)
+{
+    const struct spectrometer_driver *driver = w->all->from.spectrometer;
+    if (!driver->counts)
+        return fail(err, ERROR_CONFIG, "the driver %s has no raw counts", driver->name);
+    while (!stopping(w->all) && clock_now_ns() < wanted->deadline_ns) {
+        if (!driver->counts(device, wanted->integration_us, wanted->deadline_ns, out, err))
+            return false;
+        if (out->taken.earliest_ns >= wanted->asked_ns)
+            return true;
+    }
+    return fail(err, ERROR_RETRY, "time is up");
+}
+
+// False when the instrument is lost.
+static bool work_on_series(struct worker *w, void *device, struct error *err)
+{
+    struct series_wanted wanted;
+    uint64_t number;
+    if (w->instrument != INSTRUMENT_SPECTROMETER || !series_asked(w->all, &wanted, &number))
+        return true;
+    struct series *done = calloc(1, sizeof *done);
+    struct spectrum_counts counts;
+    struct error why = {0};
+    bool fine = done || fail(&why, ERROR_SYSTEM, "no memory for a series");
+    while (fine && done->readings < wanted.readings)
+        fine =
+            (take_counts(w, device, &wanted, &counts, &why) && series_add(done, &counts, &why)) ||
+            while_doing(&why, "reading %d of %d", done->readings + 1, wanted.readings);
+    answer_series(w->all, number, done, &why);
+    free(done);
+    if (why.code == ERROR_GONE)
+        *err = why;
+    return why.code != ERROR_GONE;
+}
+
+uint64_t acquire_ask_series(struct acquire *a, const struct series_wanted *wanted)
+{
+    struct series_desk *d = &a->series;
+    pthread_mutex_lock(&d->lock);
+    d->wanted = *wanted;
+    uint64_t number = ++d->asked;
+    pthread_mutex_unlock(&d->lock);
+    return number;
+}
+
+bool acquire_series(struct acquire *a, uint64_t number, struct series *out, struct error *err)
+{
+    struct series_desk *d = &a->series;
+    pthread_mutex_lock(&d->lock);
+    bool answered = d->answered == number;
+    if (answered) {
+        *err = d->err;
+        *out = d->done;
+    }
+    pthread_mutex_unlock(&d->lock);
+    return answered;
+}
+
 // Reads until the instrument is lost or all stops. True when it gave samples.
 static bool read_on(struct worker *w, void *device, struct error *err)
 {
     bool any = false;
     int64_t last_ns = clock_now_ns();
     while (!stopping(w->all)) {
+        int64_t before_ns = clock_now_ns();
+        if (!work_on_series(w, device, err))
+            return any;
         int64_t now_ns = clock_now_ns();
+        last_ns += now_ns - before_ns; // no sample was due meanwhile
         int64_t patience_ns = w->face.patience_ns(&w->sample);
         if (w->face.read(&w->all->from, device, now_ns + patience_ns, &w->sample, err)) {
             deliver(w);
@@ -300,6 +400,7 @@ struct acquire *acquire_start(const struct acquire_from *from, struct error *err
     pthread_cond_init(&a->wake, &monotonic);
     pthread_condattr_destroy(&monotonic);
     pthread_mutex_init(&a->lock, NULL);
+    pthread_mutex_init(&a->series.lock, NULL);
     a->from = *from;
     if (start(a, INSTRUMENT_SPECTROMETER, spectrometer_face(from), err) &&
         start(a, INSTRUMENT_ACCELEROMETER, accelerometer_face(from), err) &&
@@ -336,6 +437,7 @@ bool acquire_stop(struct acquire *a, int64_t deadline_ns)
         pthread_mutex_destroy(&a->workers[i].lock);
     }
     pthread_mutex_destroy(&a->lock);
+    pthread_mutex_destroy(&a->series.lock);
     pthread_cond_destroy(&a->wake);
     free(a);
     return true;

@@ -6,6 +6,7 @@
 
 #include "base/mailbox.h"
 #include "config/booth.h"
+#include "daemon/series.h"
 #include "daemon/state.h"
 
 #define INSTRUMENTS(X)                                                                             \
@@ -74,6 +75,16 @@ bool acquire_stop(struct acquire *acquire, int64_t deadline_ns);
 
 // Newest samples and their running numbers. Any thread.
 void acquire_latest(struct acquire *acquire, struct samples *out);
+
+// Asks the spectrometer's own thread for a series of raw readings; meanwhile it
+// gives no samples. Returns the request's number; a new request replaces one
+// that nobody works on yet. Any thread.
+uint64_t acquire_ask_series(struct acquire *acquire, const struct series_wanted *wanted);
+
+// True when the request of that number was worked on: then out holds the
+// series, or err says why there is none (code NONE: there is).
+bool acquire_series(struct acquire *acquire, uint64_t number, struct series *out,
+                    struct error *err);
 
 // Any thread.
 void acquire_report(struct acquire *acquire, enum instrument instrument,

@@ -125,6 +125,13 @@ static bool parse_teach(const json_t *request, struct job *job, struct error *er
            take_number(request, "timeout_s", 50, 0.1, 600, &job->timeout_s, err);
 }
 
+static bool parse_raw(const json_t *request, struct job *job, struct error *err)
+{
+    return take_whole(request, "integration_us", 0, 0, 65535000, &job->integration_us, err) &&
+           take_whole(request, "readings", 20, 1, SERIES_MOST, &job->readings, err) &&
+           take_number(request, "timeout_s", 50, 0.1, 3600, &job->timeout_s, err);
+}
+
 static const struct command commands[] = {
     {CONTROL_SHOW, JOB_SHOW, parse_show, {"material", "patch"}},
     {CONTROL_PATCH, JOB_PATCH, parse_patch, {"rgb"}},
@@ -132,6 +139,7 @@ static const struct command commands[] = {
     {CONTROL_PROBE, JOB_PROBE, parse_probe, {"x_px", "y_px"}},
     {CONTROL_MEASURE, JOB_MEASURE, parse_measure, {"timeout_s"}},
     {CONTROL_TEACH, JOB_TEACH, parse_teach, {"lamp", "readings", "timeout_s"}},
+    {CONTROL_RAW, JOB_RAW, parse_raw, {"integration_us", "readings", "timeout_s"}},
     {CONTROL_RELOAD, JOB_RELOAD, parse_nothing, {0}},
     {CONTROL_QUIT, JOB_QUIT, parse_nothing, {0}},
 };
@@ -165,13 +173,13 @@ bool command_parse(const char *what, const json_t *request, struct job *job, str
     }
     return fail(err, ERROR_RANGE,
                 "\"%.40s\" is no request; there is: status, show, patch, capture, probe, measure, "
-                "teach, reload, quit",
+                "teach, raw, reload, quit",
                 what);
 }
 
 bool command_is_for_desk(enum job_kind kind)
 {
-    return kind == JOB_MEASURE || kind == JOB_TEACH;
+    return kind == JOB_MEASURE || kind == JOB_TEACH || kind == JOB_RAW;
 }
 
 static bool save_light(const struct job *job, struct error *err)

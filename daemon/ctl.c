@@ -2,6 +2,7 @@
 #include "daemon/ctl.h"
 
 #include <getopt.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -20,6 +21,8 @@ const char ctl_help[] =
     "  probe X Y                   what that pixel should be, in double precision\n"
     "  measure                     a reading of the radiometer\n"
     "  teach LAMP [--readings N]   mean spectrum of the lamp now on (20 readings)\n"
+    "  raw [--readings N] [--integration US]\n"
+    "                              raw counts of the spectrometer (20 readings)\n"
     "  reload                      load settings, display model and lamps again\n"
     "  quit                        end boothd\n"
     "\n"
@@ -37,6 +40,7 @@ enum {
     OPTION_TIMEOUT,
     OPTION_PATCH,
     OPTION_READINGS,
+    OPTION_INTEGRATION,
     OPTION_VERSION,
     OPTION_HELP
 };
@@ -47,6 +51,7 @@ static const struct option long_options[] = {
     {"timeout", required_argument, NULL, OPTION_TIMEOUT},
     {"patch", required_argument, NULL, OPTION_PATCH},
     {"readings", required_argument, NULL, OPTION_READINGS},
+    {"integration", required_argument, NULL, OPTION_INTEGRATION},
     {"version", no_argument, NULL, OPTION_VERSION},
     {"help", no_argument, NULL, OPTION_HELP},
     {0},
@@ -56,7 +61,7 @@ static const struct option long_options[] = {
 struct words {
     const char *of[8];
     int count;
-    const char *patch, *readings;
+    const char *patch, *readings, *integration;
 };
 
 static bool number(const char *name, const char *text, double least, double most, double *out,
@@ -124,6 +129,16 @@ static json_t *teach(const struct words *w, struct error *err)
     return json_pack("{s:s, s:s, s:f}", "do", w->of[0], "lamp", w->of[1], "readings", readings);
 }
 
+static json_t *raw(const struct words *w, struct error *err)
+{
+    double readings = 20, us = 0;
+    if (w->readings && !number("--readings", w->readings, 1, 1000, &readings, err))
+        return NULL;
+    if (w->integration && !number("--integration", w->integration, 10, 65535000, &us, err))
+        return NULL;
+    return json_pack("{s:s, s:f, s:f}", "do", w->of[0], "readings", readings, "integration_us", us);
+}
+
 static const struct command {
     const char *name;
     int arguments;
@@ -133,8 +148,8 @@ static const struct command {
     {CONTROL_STATUS, 0, 10, simple}, {CONTROL_SHOW, 1, 60, show},
     {CONTROL_PATCH, 3, 60, patch},   {CONTROL_CAPTURE, 1, 60, capture},
     {CONTROL_PROBE, 2, 60, probe},   {CONTROL_MEASURE, 0, 90, simple},
-    {CONTROL_TEACH, 1, 90, teach},   {CONTROL_RELOAD, 0, 60, simple},
-    {CONTROL_QUIT, 0, 10, simple},
+    {CONTROL_TEACH, 1, 90, teach},   {CONTROL_RAW, 0, 90, raw},
+    {CONTROL_RELOAD, 0, 60, simple}, {CONTROL_QUIT, 0, 10, simple},
 };
 
 static const struct command *find(const char *name)
@@ -159,6 +174,9 @@ static bool take_option(int option, const char *value, struct words *words, stru
         return true;
     case OPTION_READINGS:
         words->readings = value;
+        return true;
+    case OPTION_INTEGRATION:
+        words->integration = value;
         return true;
     case OPTION_JSON:
         return c->json = true;
@@ -185,8 +203,11 @@ static bool make_request(const struct words *w, struct ctl *c, struct error *err
                     command->name, command->arguments, w->count - 1);
     if (w->patch && strcmp(command->name, CONTROL_SHOW))
         return fail(err, ERROR_CONFIG, "--patch belongs to show");
-    if (w->readings && strcmp(command->name, CONTROL_TEACH))
-        return fail(err, ERROR_CONFIG, "--readings belongs to teach");
+    bool is_raw = !strcmp(command->name, CONTROL_RAW);
+    if (w->readings && !is_raw && strcmp(command->name, CONTROL_TEACH))
+        return fail(err, ERROR_CONFIG, "--readings belongs to teach and raw");
+    if (w->integration && !is_raw)
+        return fail(err, ERROR_CONFIG, "--integration belongs to raw");
     struct error why = {0};
     c->what = command->name;
     c->request = command->request(w, &why);
@@ -341,6 +362,24 @@ static void print_measure(const json_t *r, FILE *out)
             json_is_true(json_object_get(r, "emulated")) ? " (emulated)" : "", text(r, "taken_at"));
 }
 
+static double largest(const json_t *values)
+{
+    double most = 0;
+    for (size_t i = 0; i < json_array_size(values); i++)
+        most = fmax(most, json_number_value(json_array_get(values, i)));
+    return most;
+}
+
+static void print_raw(const json_t *r, FILE *out)
+{
+    const json_t *counts = json_object_get(r, "counts");
+    fprintf(out, "%s %s%s: %zu pixels, %.0f readings of %.0f us, highest %.0f of %.0f counts%s\n",
+            text(r, "instrument"), text(r, "serial"),
+            json_is_true(json_object_get(r, "emulated")) ? " (emulated)" : "",
+            json_array_size(counts), real(r, "readings"), real(r, "integration_us"),
+            largest(counts), real(r, "saturation"), real(r, "saturated") > 0 ? ", saturated" : "");
+}
+
 static void print_probe(const json_t *r, FILE *out)
 {
     fprintf(out, "%.2f lx\nsurface ", real(r, "lux"));
@@ -364,6 +403,8 @@ static void print_done(const char *what, const json_t *reply, FILE *out)
     else if (!strcmp(what, CONTROL_TEACH))
         fprintf(out, "%s: %.1f lx, spread %.4f over %.0f readings\n", text(reply, "lamp"),
                 real(reply, "lux"), real(reply, "spread"), real(reply, "readings"));
+    else if (!strcmp(what, CONTROL_RAW))
+        print_raw(reply, out);
     else if (!strcmp(what, CONTROL_CAPTURE))
         fprintf(out, "%s\n", text(reply, "file"));
 }

@@ -11,6 +11,7 @@
 
 static const int LOOK_EVERY_MS = 100;
 static const int64_t SAMPLE_POLL_NS = 5 * NS_PER_MS; // well below any exposure
+static const int64_t GRACE_NS = 5 * NS_PER_S;        // for a driver that ends at its deadline
 static const int64_t OPEN_WITHIN_NS = 10 * NS_PER_S; // a PR-655 wakes up slowly
 
 struct desk {
@@ -141,6 +142,8 @@ void teach_average(const struct spectrum *readings, int count, struct spectrum *
     *spread = all > 0 ? sqrt(off / all) : 0;
 }
 
+// ---- teaching ------------------------------------------------------------------
+
 // Good readings that began after this call.
 static bool gather(struct desk *d, const struct job *job, struct spectrum *readings,
                    struct error *err)
@@ -192,6 +195,88 @@ static void teach(struct desk *d, struct job *job)
     free(readings);
 }
 
+// ---- raw counts ----------------------------------------------------------------
+
+// False when the time is up, or when nobody would answer.
+static bool await_series(struct desk *d, const struct job *job, struct series *out,
+                         struct error *err)
+{
+    int64_t now_ns = clock_now_ns();
+    const struct series_wanted wanted = {job->integration_us, job->readings, now_ns,
+                                         now_ns + (int64_t)(job->timeout_s * NS_PER_S)};
+    uint64_t number = acquire_ask_series(d->instruments, &wanted);
+    while (!acquire_series(d->instruments, number, out, err)) {
+        if (clock_now_ns() > wanted.deadline_ns + GRACE_NS || stopping(d))
+            return fail(err, ERROR_RETRY, "the spectrometer did not answer within %g s",
+                        job->timeout_s);
+        clock_sleep_until_ns(clock_now_ns() + SAMPLE_POLL_NS);
+    }
+    return err->code == ERROR_NONE;
+}
+
+static json_t *range_json(const struct pixel_range *r)
+{
+    return json_pack("[i,i]", r->first, r->last);
+}
+
+static json_t *series_json(const struct series *s)
+{
+    const struct detector *r = &s->detector;
+    json_t *black = json_array();
+    for (int i = 0; i < DETECTOR_BLACK_RANGES; i++)
+        if (r->black[i].last >= r->black[i].first)
+            json_array_append_new(black, range_json(&r->black[i]));
+    return json_pack(
+        "{s:i, s:i, s:i, s:o, s:o, s:o, s:o, s:o, s:o, s:f, s:f, s:o, s:o, s:o}", "integration_us",
+        s->integration_us, "readings", s->readings, "saturated", s->saturated, "counts",
+        numbers(s->mean, r->pixels), "deviation", numbers(s->deviation, r->pixels), "active_means",
+        numbers(s->active, s->readings), "black_means", numbers(s->black, s->readings), "active",
+        range_json(&r->active), "black", black, "saturation", r->saturation, "full_counts",
+        r->full_counts, "nonlinearity", numbers(r->nonlinearity, r->order + 1), "wavelength_nm",
+        numbers(r->wavelength, 4), "own_wavelength_nm", numbers(r->own_wavelength, 4));
+}
+
+static void raw(struct desk *d, struct job *job)
+{
+    struct instrument_report from;
+    struct series *series = calloc(1, sizeof *series);
+    acquire_report(d->instruments, INSTRUMENT_SPECTROMETER, &from);
+    if (!series)
+        fail(&job->err, ERROR_SYSTEM, "no memory for raw counts");
+    else if (from.state == INSTRUMENT_IS_NONE)
+        fail(&job->err, ERROR_CONFIG, "the settings name no spectrometer");
+    else if (from.state == INSTRUMENT_IS_WAITING)
+        fail(&job->err, ERROR_GONE, "the spectrometer is not there: %s", from.error.text);
+    else if (await_series(d, job, series, &job->err)) {
+        job->reply = series_json(series);
+        add_identity(job->reply, &from.identity);
+    }
+    free(series);
+}
+
+static void do_job(struct desk *d, struct job *job)
+{
+    switch (job->kind) {
+    case JOB_MEASURE:
+        measure(d, job);
+        return;
+    case JOB_TEACH:
+        teach(d, job);
+        return;
+    case JOB_RAW:
+        raw(d, job);
+        return;
+    case JOB_SHOW:
+    case JOB_PATCH:
+    case JOB_CAPTURE:
+    case JOB_PROBE:
+    case JOB_RELOAD:
+    case JOB_QUIT:
+        fail(&job->err, ERROR_RANGE, "not the desk's");
+        return;
+    }
+}
+
 static void *work(void *argument)
 {
     struct desk *d = argument;
@@ -201,10 +286,7 @@ static void *work(void *argument)
         poll(&waiting, 1, LOOK_EVERY_MS);
         if (!jobs_take(d->jobs, &job))
             continue;
-        if (job.kind == JOB_MEASURE)
-            measure(d, &job);
-        else
-            teach(d, &job);
+        do_job(d, &job);
         jobs_finish(d->jobs, &job);
     }
     return NULL;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where measuring waits: a thread that owns the radiometer and does what takes
-// seconds (measure, teach), so that frames and other requests do not.
+// seconds (measure, teach, raw counts), so that frames and other requests do not.
 #ifndef DAEMON_DESK_H
 #define DAEMON_DESK_H
 
@@ -17,7 +17,7 @@ struct desk *desk_open(const struct booth_settings *settings, struct acquire *in
 // As acquire_stop: false when still inside a reading at deadline_ns.
 bool desk_close(struct desk *desk, int64_t deadline_ns);
 
-// Takes MEASURE and TEACH jobs; they come back through jobs_finished.
+// Takes MEASURE, TEACH and RAW jobs; they come back through jobs_finished.
 struct jobs *desk_jobs(struct desk *desk);
 
 // Any thread.

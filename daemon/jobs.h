@@ -20,6 +20,7 @@ enum job_kind {
     JOB_QUIT,
     JOB_MEASURE, // … the desk
     JOB_TEACH,
+    JOB_RAW,
 };
 
 struct job {
@@ -30,6 +31,7 @@ struct job {
     char patch[64]; // SHOW, "" = the whole material
     struct counts counts;
     int x_px, y_px, readings;
+    int integration_us; // RAW, 0 = as it is
     double timeout_s;
     // Answered: a reply, or NULL with err; CAPTURE also one of the pictures.
     json_t *reply;

@@ -198,6 +198,7 @@ void request_do(struct booth *b, const struct setup_source *source, struct job *
         return;
     case JOB_MEASURE:
     case JOB_TEACH:
+    case JOB_RAW:
         fail(&job->err, ERROR_RANGE, "not the main thread's");
         return;
     }

@@ -41,6 +41,7 @@ struct spectrometer {
     char firmware[16];
     bool flame;
     int integration_us;
+    int lent_us;       // exposure of read's own while counts are asked for, 0 = not
     int slowest_us;    // of the exposures that may still be under way
     int stale;         // spectra to throw away before the next one counts
     bool adrift;       // bytes were lost: drain before the next request
@@ -337,15 +338,22 @@ static bool acquire(struct spectrometer *s, int64_t deadline_ns, uint16_t raw[OC
     return true;
 }
 
+// One failed reading is repeated.
+static bool acquire_twice(struct spectrometer *s, int64_t deadline_ns,
+                          uint16_t raw[OCEAN_PIXELS_MOST], struct interval *taken,
+                          struct error *err)
+{
+    return acquire(s, deadline_ns, raw, taken, err) ||
+           (err->code == ERROR_RETRY && fits(s, s->stale + 1, deadline_ns) &&
+            acquire(s, deadline_ns, raw, taken, err));
+}
+
 static bool add_reading(struct spectrometer *s, int64_t deadline_ns, struct ocean_reading *reading,
                         struct interval *taken, struct error *err)
 {
     uint16_t raw[OCEAN_PIXELS_MOST];
     struct interval one;
-    bool ok = acquire(s, deadline_ns, raw, &one, err);
-    if (!ok && err->code == ERROR_RETRY && fits(s, s->stale + 1, deadline_ns))
-        ok = acquire(s, deadline_ns, raw, &one, err);
-    if (!ok)
+    if (!acquire_twice(s, deadline_ns, raw, &one, err))
         return false;
     if (reading->averaged == 0)
         *taken = one;
@@ -392,11 +400,42 @@ static enum spectrometer_status judge(const struct spectrometer *s,
                                                                        : SPECTROMETER_GOOD;
 }
 
+static bool take_back(struct spectrometer *s, int64_t deadline_ns, struct error *err)
+{
+    if (s->lent_us && s->lent_us != s->integration_us &&
+        !set_integration(s, s->lent_us, deadline_ns, err))
+        return lost(s, err);
+    s->lent_us = 0;
+    return true;
+}
+
+static bool ocean_counts(struct spectrometer *s, int integration_us, int64_t deadline_ns,
+                         struct spectrum_counts *out, struct error *err)
+{
+    struct error own;
+    err = err ? err : &own;
+    const struct exposure_limits limits = limits_of(s, s->unit.model->most_us);
+    int read_us = s->lent_us ? s->lent_us : s->integration_us;
+    int us = integration_us ? exposure_round(integration_us, &limits) : read_us;
+    uint16_t raw[OCEAN_PIXELS_MOST];
+    struct interval taken;
+    s->lent_us = read_us;
+    if (us != s->integration_us && !set_integration(s, us, deadline_ns, err))
+        return lost(s, err);
+    if (!acquire_twice(s, deadline_ns, raw, &taken, err))
+        return false;
+    *out = (struct spectrum_counts){taken, us, ocean_detector(&s->unit), {0}};
+    memcpy(out->raw, raw, sizeof *raw * (size_t)s->unit.model->pixels);
+    return true;
+}
+
 static bool ocean_read(struct spectrometer *s, int64_t deadline_ns, struct spectrum_sample *out,
                        struct error *err)
 {
     struct error own;
     err = err ? err : &own;
+    if (!take_back(s, deadline_ns, err))
+        return false;
     int64_t fair_us = (deadline_ns - clock_now_ns()) / NS_PER_US / (2 + STALE_READINGS);
     const struct exposure_limits limits = limits_of(s, s->options.longest_us);
     int longest = exposure_round((double)fair_us - MARGIN_US, &limits);
@@ -438,5 +477,5 @@ static void ocean_identify(const struct spectrometer *s, struct instrument_ident
     out->emulated = !strncmp(s->unit.serial, "EMU", 3);
 }
 
-const struct spectrometer_driver ocean_driver = {"ocean", ocean_open, ocean_read, ocean_identify,
-                                                 ocean_close};
+const struct spectrometer_driver ocean_driver = {"ocean",        ocean_open,  ocean_read,
+                                                 ocean_identify, ocean_close, ocean_counts};

@@ -157,8 +157,24 @@ bool ocean_unit_parse(const struct ocean_model *model,
         !(unit.stray >= 0 && unit.stray <= most_stray))
         unit.stray = 0;
     unit.saturation = saturation_of(model, replies[SLOT_SATURATION] + 2);
+    memcpy(unit.own_wavelength, unit.wavelength, sizeof unit.own_wavelength);
     *out = unit;
     return true;
+}
+
+struct detector ocean_detector(const struct ocean_unit *unit)
+{
+    const struct ocean_model *m = unit->model;
+    struct detector d = {.pixels = m->pixels,
+                         .active = m->active,
+                         .saturation = unit->saturation,
+                         .full_counts = m->full_counts,
+                         .order = unit->order};
+    memcpy(d.black, m->black, sizeof d.black);
+    memcpy(d.nonlinearity, unit->nonlinearity, sizeof d.nonlinearity);
+    memcpy(d.wavelength, unit->wavelength, sizeof d.wavelength);
+    memcpy(d.own_wavelength, unit->own_wavelength, sizeof d.own_wavelength);
+    return d;
 }
 
 void ocean_reading_add(const struct ocean_unit *unit, struct pixel_range used,

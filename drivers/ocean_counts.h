@@ -17,11 +17,12 @@ enum {
 struct ocean_unit {
     const struct ocean_model *model;
     char serial[16];
-    double wavelength[4];   // nm = sum of wavelength[i] x pixel^i, pixel from 0
-    double nonlinearity[8]; // over scaled counts
-    int order;              // of nonlinearity, 0..7; -1: slots invalid, no correction
-    double stray;           // part of the mean signal that is stray light, 0..0.1
-    double saturation;      // raw counts, > 0
+    double wavelength[4];     // nm = sum of wavelength[i] x pixel^i, pixel from 0
+    double own_wavelength[4]; // as the slots say; wavelength may be a refit's
+    double nonlinearity[8];   // over scaled counts
+    int order;                // of nonlinearity, 0..7; -1: slots invalid, no correction
+    double stray;             // part of the mean signal that is stray light, 0..0.1
+    double saturation;        // raw counts, > 0
 };
 
 // Reads the replies to slots 0..17. DATA when an echo is wrong, the serial is
@@ -34,6 +35,9 @@ bool ocean_unit_parse(const struct ocean_model *model,
 // Other wavelengths than the unit's own (see wavelength_refit.h). False and
 // untouched when they do not ascend through the visible.
 bool ocean_unit_rewave(struct ocean_unit *unit, const double wavelength[4]);
+
+// What its raw counts are about.
+struct detector ocean_detector(const struct ocean_unit *unit);
 
 // Finite, constant term within (0.5, 1.5), and the polynomial within (0.5, 1.5)
 // over 0..most scaled counts; order 0..7.

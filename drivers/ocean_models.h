@@ -9,11 +9,12 @@
 #include <stdint.h>
 
 #include "base/error.h"
+#include "drivers/detector.h"
 
 enum {
     OCEAN_PIXELS_MOST = 3840,
     OCEAN_BYTES_MOST = 2 * OCEAN_PIXELS_MOST + 1,
-    OCEAN_DARK_RANGES = 2,
+    OCEAN_DARK_RANGES = DETECTOR_BLACK_RANGES,
     OCEAN_VENDOR = 0x2457,
 };
 
@@ -21,10 +22,6 @@ enum ocean_saturation {
     OCEAN_SATURATION_FIXED, // full_counts
     OCEAN_SATURATION_AT_4,  // u16 at bytes 4..5 of slot 17's data, 0 = full_counts
     OCEAN_SATURATION_AT_0,  // u16 at bytes 0..1, up to 32768 = not set = full_counts
-};
-
-struct pixel_range {
-    int first, last; // inclusive; last < first: empty
 };
 
 struct ocean_model {

@@ -151,5 +151,5 @@ static void replay_identify(const struct spectrometer *s, struct instrument_iden
     out->emulated = true;
 }
 
-const struct spectrometer_driver replay_driver = {"replay", replay_open, replay_read,
-                                                  replay_identify, replay_close};
+const struct spectrometer_driver replay_driver = {"replay",        replay_open,  replay_read,
+                                                  replay_identify, replay_close, NULL};

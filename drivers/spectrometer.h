@@ -6,6 +6,7 @@
 #include "base/clock.h"
 #include "base/settings.h"
 #include "colorimetry/spectrum.h"
+#include "drivers/detector.h"
 
 #define SPECTROMETER_STATUSES(X)                                                                   \
     X(GOOD, "good")                                                                                \
@@ -26,13 +27,21 @@ struct spectrum_sample {
     enum spectrometer_status status;
     int integration_us; // of this reading
     int averaged;       // readings averaged, >= 1
-    bool dark_missing; // stored darks were asked for, but none covers this exposure
+    bool dark_missing;  // stored darks were asked for, but none covers this exposure
     double peak;        // largest raw count over saturation, 0..1
     // W m-2 nm-1 on the inner grid; 0 where the instrument does not reach.
     struct spectrum irradiance;
     // Standard uncertainty of it (shot, read, dark, calibration), same unit; all
     // 0 where none is known (replay).
     struct spectrum sigma;
+};
+
+// One exposure as the detector counted it, before any processing.
+struct spectrum_counts {
+    struct interval taken;
+    int integration_us;
+    struct detector detector;
+    uint16_t raw[DETECTOR_PIXELS_MOST]; // detector.pixels of them
 };
 
 struct instrument_identity {
@@ -76,6 +85,11 @@ struct spectrometer_driver {
                  struct error *err);
     void (*identify)(const struct spectrometer *device, struct instrument_identity *out);
     void (*close)(struct spectrometer *device); // accepts NULL
+    // The counts of one exposure of about integration_us, rounded to what the
+    // instrument can hold; 0: the exposure that read has come to. The next read goes
+    // back to its own exposure. Errors as read. NULL: the driver has no counts.
+    bool (*counts)(struct spectrometer *device, int integration_us, int64_t deadline_ns,
+                   struct spectrum_counts *out, struct error *err);
 };
 
 // NULL-terminated.

@@ -87,6 +87,24 @@ static void slots_tell_serial_wavelengths_and_saturation(void **state)
     assert_int_equal(unit.order, 7);
 }
 
+static void a_refit_replaces_the_units_wavelengths_but_not_what_it_says(void **state)
+{
+    (void)state;
+    struct ocean_unit unit = unit_of();
+    const double refit[4] = {191, 0.385, -1.9e-5, -9e-10}, falling[4] = {900, -0.3, 0, 0};
+    assert_false(ocean_unit_rewave(&unit, falling));
+    assert_true(ocean_unit_rewave(&unit, refit));
+    struct detector d = ocean_detector(&unit);
+    assert_int_equal(d.pixels, PIXELS);
+    assert_int_equal(d.active.first, ACTIVE_FIRST);
+    assert_int_equal(d.black[0].last, 17);
+    assert_int_equal(d.order, 7);
+    for (int i = 0; i < 4; i++) {
+        assert_near(d.wavelength[i], refit[i], 0);
+        assert_near(d.own_wavelength[i], unit_of().wavelength[i], 0);
+    }
+}
+
 static void a_slot_may_fill_all_fifteen_bytes(void **state)
 {
     (void)state;
@@ -399,6 +417,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(slots_tell_serial_wavelengths_and_saturation),
+        cmocka_unit_test(a_refit_replaces_the_units_wavelengths_but_not_what_it_says),
         cmocka_unit_test(a_slot_may_fill_all_fifteen_bytes),
         cmocka_unit_test(an_unset_saturation_means_full_scale),
         cmocka_unit_test(slots_that_answer_for_another_or_hold_junk_are_refused),

@@ -261,6 +261,8 @@ static void every_bad_request_is_refused_by_name_and_hurts_nobody(void **state)
     refused(json_pack("{ss,sf}", "do", "measure", "timeout_s", -1.0), ERROR_RANGE, "timeout_s");
     refused(json_pack("{ss,ss}", "do", "teach", "lamp", "A"), ERROR_CONFIG, "no spectrometer");
     refused(json_pack("{ss,ss}", "do", "teach", "lamp", "../A"), ERROR_RANGE, "../A");
+    refused(json_pack("{ss}", "do", "raw"), ERROR_CONFIG, "no spectrometer");
+    refused(json_pack("{ss,si}", "do", "raw", "readings", 1001), ERROR_RANGE, "readings: 1001");
     refused(json_pack("{ss,ss,si}", "do", "teach", "lamp", "A", "readings", 0), ERROR_RANGE,
             "readings");
     json_decref(ask(json_pack("{ss}", "do", "status")));
