@@ -2,13 +2,21 @@
 #include "drivers/wavelength_refit.h"
 
 #include <math.h>
-#include <string.h>
+#include <stdlib.h>
 
-enum { PEAKS_MOST = 256, HALF_WIDTH = 3, NEIGHBOURS = 12, SHIFT_STEPS = 50, ORDER = 4 };
+enum {
+    PEAKS_MOST = 256,
+    HALF_WIDTH = 3,
+    NEIGHBOURS = 12,
+    SHIFT_STEPS = 50,
+    ORDER = 4,
+    AXIS_PIXELS_LEAST = 8
+};
 
 static const double shift_most_nm = 5, window_nm = 1, other_shift_nm = 2;
 static const double least_part = 0.01, noise_times = 10;
-static const double least_span_nm = 200, most_left_nm = 0.5;
+static const double least_span_nm = 200, most_left_nm = 0.5, least_left_nm = 0.03;
+static const double visible_nm[2] = {400, 700};
 
 const double refit_mercury_argon[] = {253.652, 296.728, 302.150, 313.155, 334.148, 365.015,
                                       404.656, 407.783, 435.833, 546.074, 576.960, 579.066,
@@ -147,18 +155,32 @@ static bool solve(double m[ORDER][ORDER + 1], double out[ORDER])
     return true;
 }
 
-// On -1..1, where powers stay apart, as a correction of the old axis.
-static bool fit(const struct matches *m, const double old[ORDER], int pixels, double out[ORDER])
+// On -1..1, where powers stay apart.
+static void powers(double pixel, int pixels, double out[ORDER])
 {
-    double normal[ORDER][ORDER + 1] = {0}, more[ORDER];
+    double x = 2 * pixel / pixels - 1;
+    for (int i = 0; i < ORDER; i++)
+        out[i] = i ? out[i - 1] * x : 1;
+}
+
+static void add_normal(double normal[ORDER][ORDER + 1], const double power[ORDER], double value)
+{
+    for (int i = 0; i < ORDER; i++) {
+        for (int j = 0; j < ORDER; j++)
+            normal[i][j] += power[i] * power[j];
+        normal[i][ORDER] += power[i] * value;
+    }
+}
+
+// As a correction of the old axis.
+static bool fit(const double *pixel, const double *nm, int count, const double old[ORDER],
+                int pixels, double out[ORDER])
+{
+    double normal[ORDER][ORDER + 1] = {0}, power[ORDER], more[ORDER];
     const double half = pixels / 2.0;
-    for (int k = 0; k < m->count; k++) {
-        double x = m->pixel[k] / half - 1, power[ORDER] = {1, x, x * x, x * x * x};
-        for (int i = 0; i < ORDER; i++) {
-            for (int j = 0; j < ORDER; j++)
-                normal[i][j] += power[i] * power[j];
-            normal[i][ORDER] += power[i] * (m->nm[k] - at(old, m->pixel[k]));
-        }
+    for (int k = 0; k < count; k++) {
+        powers(pixel[k], pixels, power);
+        add_normal(normal, power, nm[k] - at(old, pixel[k]));
     }
     if (!solve(normal, more))
         return false;
@@ -170,20 +192,33 @@ static bool fit(const struct matches *m, const double old[ORDER], int pixels, do
     return true;
 }
 
-static bool check_fit(const struct matches *m, const double c[ORDER], int pixels, double *rms,
-                      struct error *err)
+static bool take_lines(const struct matches *m, const double old[ORDER], struct refit *r,
+                       struct error *err)
 {
     double sum = 0;
+    r->lines = m->count;
     for (int k = 0; k < m->count; k++) {
-        double off = at(c, m->pixel[k]) - m->nm[k];
+        double is = at(r->wavelength, m->pixel[k]), off = is - m->nm[k];
+        r->line[k] = (struct refit_line){m->nm[k], m->pixel[k], at(old, m->pixel[k]), off};
         if (!(fabs(off) <= most_left_nm))
             return fail(err, ERROR_DATA, "the line at %g nm is left %.2f nm off", m->nm[k], off);
         sum += off * off;
     }
-    for (int i = 0; i < pixels; i++)
-        if (!(at(c, i + 0.5) > at(c, i - 0.5)))
+    r->rms_nm = sqrt(sum / m->count);
+    return true;
+}
+
+static bool check_axis(const struct refit *r, struct error *err)
+{
+    for (int i = 0; i < r->pixels; i++) {
+        double nm = at(r->wavelength, i);
+        if (!(at(r->wavelength, i + 0.5) > at(r->wavelength, i - 0.5)))
             return fail(err, ERROR_DATA, "fitted wavelengths do not ascend at pixel %d", i);
-    *rms = sqrt(sum / m->count);
+        if (nm >= visible_nm[0] && nm <= visible_nm[1] && refit_sigma(r, i) > most_left_nm)
+            return fail(err, ERROR_DATA,
+                        "the %d lines found leave the axis uncertain by %.1f nm at %.0f nm",
+                        r->lines, refit_sigma(r, i), nm);
+    }
     return true;
 }
 
@@ -192,7 +227,7 @@ bool refit_wavelengths(const double *counts, int pixels, const double old[4],
 {
     double peaks[PEAKS_MOST];
     struct matches m;
-    struct refit r;
+    struct refit r = {.pixels = pixels};
     int peak_count = find_peaks(counts, pixels, peaks);
     if (!best_shift(old, peaks, peak_count, lines_nm, &m, &r.shift_nm, err))
         return false;
@@ -200,11 +235,50 @@ bool refit_wavelengths(const double *counts, int pixels, const double old[4],
     if (span < least_span_nm)
         return fail(err, ERROR_DATA, "the %d lines found span %.0f nm; at least %.0f nm", m.count,
                     span, least_span_nm);
-    if (!fit(&m, old, pixels, r.wavelength))
+    if (!fit(m.pixel, m.nm, m.count, old, pixels, r.wavelength))
         return fail(err, ERROR_DATA, "the %d lines found do not fix the axis", m.count);
-    r.lines = m.count;
-    if (!check_fit(&m, r.wavelength, pixels, &r.rms_nm, err))
+    if (!take_lines(&m, old, &r, err) || !check_axis(&r, err))
         return false;
     *out = r;
+    return true;
+}
+
+double refit_nm(const double wavelength[4], double pixel)
+{
+    return at(wavelength, pixel);
+}
+
+// Variance of the residuals times p' (P'P)^-1 p.
+double refit_sigma(const struct refit *r, double pixel)
+{
+    double normal[ORDER][ORDER + 1] = {0}, power[ORDER], here[ORDER], solved[ORDER], spread = 0;
+    powers(pixel, r->pixels, here);
+    for (int k = 0; k < r->lines; k++) {
+        powers(r->line[k].pixel, r->pixels, power);
+        add_normal(normal, power, 0);
+    }
+    for (int i = 0; i < ORDER; i++)
+        normal[i][ORDER] = here[i];
+    if (r->lines <= ORDER || !solve(normal, solved))
+        return INFINITY;
+    for (int i = 0; i < ORDER; i++)
+        spread += here[i] * solved[i];
+    double left = r->rms_nm * sqrt((double)r->lines / (r->lines - ORDER));
+    return fmax(left, least_left_nm) * sqrt(fmax(spread, 0));
+}
+
+bool refit_axis(const double *nm, int pixels, double out[4], double *worst_nm, struct error *err)
+{
+    const double none[ORDER] = {0};
+    double *pixel = calloc(pixels > 0 ? (size_t)pixels : 1, sizeof *pixel), worst = 0;
+    for (int i = 0; pixel && i < pixels; i++)
+        pixel[i] = i;
+    bool fits = pixel && pixels >= AXIS_PIXELS_LEAST && fit(pixel, nm, pixels, none, pixels, out);
+    free(pixel);
+    if (!fits)
+        return fail(err, ERROR_DATA, "%d wavelengths are no axis", pixels);
+    for (int i = 0; i < pixels; i++)
+        worst = fmax(worst, fabs(at(out, i) - nm[i]));
+    *worst_nm = worst;
     return true;
 }

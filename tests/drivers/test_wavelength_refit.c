@@ -19,6 +19,9 @@ static const double true_nm[4] = {189.80809, 0.38583738, -1.9762801e-05, -9.4763
 static const double old_nm[4] = {191.10, 0.38530, -1.95e-05, -9.6e-10};
 static const double close_nm = 0.05; // a seventh of a pixel, with noise and lines of 1.3 nm width
 
+static const double arithmetic = 1e-9;
+static const double sigmas = 4; // of a normal error, over 37 pixels
+
 static double axis(const double c[4], double x)
 {
     return c[0] + x * (c[1] + x * (c[2] + x * c[3]));
@@ -63,6 +66,59 @@ static void a_drifted_axis_is_found_again(void **state)
         assert_near(axis(r.wavelength, i), axis(true_nm, i), close_nm);
 }
 
+static void each_line_tells_where_it_was_and_what_is_left(void **state)
+{
+    (void)state;
+    static double counts[PIXELS];
+    struct refit r;
+    double sum = 0, worst = 0;
+    lamp(250, 880, counts);
+    assert_true(refit_wavelengths(counts, PIXELS, old_nm, refit_mercury_argon, &r, NULL));
+    for (int i = 0; i < r.lines; i++) {
+        const struct refit_line *l = &r.line[i];
+        assert_near(l->was_nm, axis(old_nm, l->pixel), arithmetic);
+        assert_near(l->left_nm, refit_nm(r.wavelength, l->pixel) - l->nm, arithmetic);
+        assert_near(axis(true_nm, l->pixel), l->nm, close_nm);
+        assert_true(i == 0 || l->nm > r.line[i - 1].nm);
+        sum += l->left_nm * l->left_nm;
+    }
+    assert_near(r.rms_nm, sqrt(sum / r.lines), arithmetic);
+    for (int i = 200; i < PIXELS; i += 50)
+        worst = fmax(worst, fabs(axis(r.wavelength, i) - axis(true_nm, i)) / refit_sigma(&r, i));
+    assert_true(worst < sigmas);
+}
+
+// A cubic through four places, each seen twice, is as uncertain there as the
+// mean of two; the residuals have eight less four degrees of freedom.
+static void the_uncertainty_is_that_of_least_squares(void **state)
+{
+    (void)state;
+    struct refit r = {.pixels = PIXELS, .lines = 8, .rms_nm = 0.1};
+    for (int i = 0; i < 8; i++)
+        r.line[i].pixel = PIXELS / 2.0 * (1 + (i / 2 - 1.5) / 1.5);
+    for (int i = 0; i < 8; i++)
+        assert_near(refit_sigma(&r, r.line[i].pixel), 0.1 * sqrt(2) * sqrt(0.5), arithmetic);
+    assert_true(refit_sigma(&r, 1.2 * PIXELS) > refit_sigma(&r, PIXELS));
+    r.lines = 4;
+    assert_true(isinf(refit_sigma(&r, 0)));
+}
+
+static void a_list_of_wavelengths_has_its_coefficients(void **state)
+{
+    (void)state;
+    static double nm[PIXELS];
+    double found[4], worst;
+    struct error err = {0};
+    for (int i = 0; i < PIXELS; i++)
+        nm[i] = rint(axis(true_nm, i) * 100) / 100; // as files round them
+    assert_true(refit_axis(nm, PIXELS, found, &worst, &err));
+    assert_true(worst < 0.0055);
+    for (int i = 0; i < PIXELS; i += 100)
+        assert_near(axis(found, i), axis(true_nm, i), 0.001);
+    assert_false(refit_axis(nm, 7, found, &worst, &err));
+    assert_int_equal(err.code, ERROR_DATA);
+}
+
 static void a_right_axis_stays(void **state)
 {
     (void)state;
@@ -104,6 +160,14 @@ static void lines_over_a_small_part_of_the_axis_are_refused(void **state)
     refused(counts, refit_mercury_argon, "span");
 }
 
+static void lines_at_one_end_alone_are_refused(void **state)
+{
+    (void)state;
+    static double counts[PIXELS];
+    lamp(360, 580, counts); // mercury in glass
+    refused(counts, refit_mercury_argon, "uncertain");
+}
+
 static void a_comb_that_fits_in_two_ways_is_refused(void **state)
 {
     (void)state;
@@ -131,6 +195,10 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_drifted_axis_is_found_again),
+        cmocka_unit_test(each_line_tells_where_it_was_and_what_is_left),
+        cmocka_unit_test(the_uncertainty_is_that_of_least_squares),
+        cmocka_unit_test(a_list_of_wavelengths_has_its_coefficients),
+        cmocka_unit_test(lines_at_one_end_alone_are_refused),
         cmocka_unit_test(a_right_axis_stays),
         cmocka_unit_test(too_few_lines_are_refused),
         cmocka_unit_test(lines_over_a_small_part_of_the_axis_are_refused),
