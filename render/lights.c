@@ -10,17 +10,21 @@ static const double SIZE_TOLERANCE = 0.01;
 static const double FAR_SIDES = 50; // beyond, a pixel is a point to 1e-4
 enum { CORNERS_MOST = 5, SPOT_STEPS = 4 };
 
-static bool size_from(const struct exr *image, const char *name, double settings, double *size,
+static bool size_from(const struct exr *image, const char *name, const double *known, double *size,
                       struct error *err)
 {
-    double value;
-    *size = settings;
-    if (!exr_number(image, name, &value))
+    double value, settings = known ? *known : NAN;
+    bool stated = exr_number(image, name, &value);
+    *size = stated ? value : settings;
+    if (!known)
+        return (stated && value > 0 && isfinite(value)) ||
+               fail(err, ERROR_DATA, "no attribute \"%s\" that says how large the ceiling is",
+                    name);
+    if (!stated)
         return true;
     if (!(fabs(value - settings) <= SIZE_TOLERANCE * settings))
         return fail(err, ERROR_DATA, "%s: %g m, but the settings say %g m (allowed within %g %%)",
                     name, value, settings, 100 * SIZE_TOLERANCE);
-    *size = value;
     return true;
 }
 
@@ -40,10 +44,12 @@ static bool map_of(const struct exr *image, const struct ceiling *ceiling,
     int channel = exr_channel(image, "Y");
     if (channel < 0)
         return fail(err, ERROR_DATA, "no channel \"Y\" (cd/m2)");
-    struct luminance_map read = {
-        .ceiling = *ceiling, .width = image->width, .height = image->height};
-    if (!size_from(image, "boothd.width_m", ceiling->width_m, &read.ceiling.width_m, err) ||
-        !size_from(image, "boothd.depth_m", ceiling->depth_m, &read.ceiling.depth_m, err))
+    struct luminance_map read = {.width = image->width, .height = image->height};
+    struct ceiling *c = &read.ceiling;
+    if (ceiling)
+        *c = *ceiling;
+    if (!size_from(image, "boothd.width_m", ceiling ? &ceiling->width_m : NULL, &c->width_m, err) ||
+        !size_from(image, "boothd.depth_m", ceiling ? &ceiling->depth_m : NULL, &c->depth_m, err))
         return false;
     size_t count = (size_t)image->width * image->height;
     const float *pixels = image->pixels + channel * count;

@@ -24,8 +24,9 @@ struct luminance_map {
 
 // From an EXR with channel "Y" (cd/m2). Size in metres from the attributes
 // boothd.width_m and boothd.depth_m when present (they must agree with
-// ceiling within 1 %), else from ceiling. What camera noise put below zero is
-// set to 0. Error DATA without "Y".
+// ceiling within 1 %), else from ceiling. ceiling may be NULL: then both
+// attributes must be there, and the centre is the origin. What camera noise put
+// below zero is set to 0. Error DATA without "Y" or without a size.
 bool luminance_map_load(const char *path, const struct ceiling *ceiling, struct luminance_map *map,
                         struct error *err);
 void luminance_map_fini(struct luminance_map *map);
@@ -46,18 +47,29 @@ struct light_points {
     struct light_point *points; // owned
 };
 
+// Pixels of a map; right and bottom lie outside.
+struct pixels {
+    int left, top, right, bottom;
+};
+
 enum median_cut { CUT_VARIANCE, CUT_ENERGY };
 
-// Exactly `most` points (1..4096), or as many as the map has lit pixels when
+// Exactly `most` points (1..1048576), or as many as the map has lit pixels when
 // those are fewer; an all-dark map gives none. The region of the greatest
 // energy (CUT_ENERGY) or second moment (CUT_VARIANCE) is split next. Sums in
-// double over each region's own columns and rows, about its own centre: a
-// summed-area table of the image would cancel away the digits of small
-// regions. Dark edges are trimmed, so that no part is ever dark; a single
-// pixel is never split; ties keep the lower index.
+// double about each region's own middle, so that small and faint regions keep
+// their digits (see line_sums.h). Dark edges are trimmed, so that no part is
+// ever dark; a single pixel is never split; ties, even those that rounding
+// hides, keep the lower index. Error RANGE.
 // Sources: Debevec 2005 (equal energy); Viriyothai, Debevec 2009 (variance).
 bool median_cut(const struct luminance_map *map, enum median_cut how, int most,
                 struct light_points *out, struct error *err);
+
+// The same, and of every point the pixels it stands for: disjoint, together
+// all that are lit. *regions has out->count elements and is the caller's to free.
+bool median_cut_regions(const struct luminance_map *map, enum median_cut how, int most,
+                        struct light_points *out, struct pixels **regions, struct error *err);
+
 void light_points_fini(struct light_points *lights);
 
 // Illuminance on a surface at p with unit normal n (booth frame), lux. Sum
