@@ -41,6 +41,7 @@ int command_warned(const char *warning);
 int command_colour(int argc, char **argv);
 int command_display(int argc, char **argv);
 int command_bands(int argc, char **argv);
+int command_light(int argc, char **argv);
 int command_session(int argc, char **argv);
 int command_list(int argc, char **argv);
 

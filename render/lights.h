@@ -53,8 +53,9 @@ struct pixels {
 };
 
 enum median_cut { CUT_VARIANCE, CUT_ENERGY };
+enum { MEDIAN_CUT_MOST = 1 << 20 };
 
-// Exactly `most` points (1..1048576), or as many as the map has lit pixels when
+// Exactly `most` points (1..MEDIAN_CUT_MOST), or as many as the map has lit pixels when
 // those are fewer; an all-dark map gives none. The region of the greatest
 // energy (CUT_ENERGY) or second moment (CUT_VARIANCE) is split next. Sums in
 // double about each region's own middle, so that small and faint regions keep

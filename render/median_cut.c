@@ -5,7 +5,6 @@
 #include "render/lights.h"
 #include "render/line_sums.h"
 
-static const int LIGHTS_MOST = 1 << 20;
 static const double TIE = 1e-12; // costs that differ less, of the whole, are equal but for rounding
 
 // Sums over pixels of L, L x, L z and L (x2 + z2), in metres from the centre
@@ -264,8 +263,8 @@ static bool take_points(const struct cutter *c, const struct region *regions, in
 bool median_cut_regions(const struct luminance_map *map, enum median_cut how, int most,
                         struct light_points *out, struct pixels **pixels, struct error *err)
 {
-    if (most < 1 || most > LIGHTS_MOST)
-        return fail(err, ERROR_RANGE, "lights: %d is outside 1..%d", most, LIGHTS_MOST);
+    if (most < 1 || most > MEDIAN_CUT_MOST)
+        return fail(err, ERROR_RANGE, "lights: %d is outside 1..%d", most, MEDIAN_CUT_MOST);
     size_t width = (size_t)map->width, height = (size_t)map->height;
     size_t longest = width > height ? width : height;
     if ((size_t)most > width * height)

@@ -21,7 +21,7 @@ struct bench {
     struct renderer *renderer;
     struct scene scene;
     struct material material;
-    struct luminance_map map;
+    struct luminance_map map, large;
     struct light_points lights;
     struct spectrum lamp;
     struct display_model display;
@@ -72,6 +72,15 @@ static bool cut(struct bench *b, struct error *err)
     return true;
 }
 
+static bool cut_large(struct bench *b, struct error *err)
+{
+    struct light_points lights;
+    if (!median_cut(&b->large, CUT_VARIANCE, 1024, &lights, err))
+        return false;
+    light_points_fini(&lights);
+    return true;
+}
+
 static bool reference_row(struct bench *b, struct error *err)
 {
     (void)err;
@@ -88,19 +97,20 @@ static const struct measure {
     {"patch frame (fill and present)", patch_frame}, {"surface frame", frame},
     {"surface frame after a pose change", pose},      {"band matrix per lamp", matrix},
     {"bake of the chart per lamp", bake},             {"median cut, 32 lights", cut},
+    {"median cut, 4096 x 2048, 1024 lights", cut_large},
     {"reference, one row of pixels", reference_row},
 };
 enum { MEASURES_COUNT = sizeof MEASURES / sizeof *MEASURES };
 
-static void fill_map(struct luminance_map *map)
+static void fill_map(struct luminance_map *map, int width, int height)
 {
     *map = (struct luminance_map){.ceiling = {{0, 0.75, 0.05}, 0.9, 0.6},
-                                  .width = MAP_WIDTH,
-                                  .height = MAP_HEIGHT,
-                                  .luminance = calloc(MAP_WIDTH * MAP_HEIGHT, sizeof(double))};
-    for (int y = 0; map->luminance && y < MAP_HEIGHT; y++)
-        for (int x = 0; x < MAP_WIDTH; x++)
-            map->luminance[y * MAP_WIDTH + x] = y % 60 < 8 ? 9000 : 80;
+                                  .width = width,
+                                  .height = height,
+                                  .luminance = calloc((size_t)width * height, sizeof(double))};
+    for (int y = 0; map->luminance && y < height; y++)
+        for (int x = 0; x < width; x++)
+            map->luminance[(size_t)y * width + x] = y % 60 < 8 ? 9000 : 80;
 }
 
 static bool fill_display(struct display_model *d, struct error *err)
@@ -124,8 +134,9 @@ static bool begin(struct bench *b, struct error *err)
         for (int k = 0; k < SPECTRUM_COUNT; k++)
             palette[i].v[k] = 0.1 + 0.8 * exp(-pow((k - 20.0 * i) / 60, 2));
     }
-    fill_map(&b->map);
-    if (!b->map.luminance || !illuminant("FL8", &b->lamp, err) || !band_set_shipped(6, &b->bands, err) ||
+    fill_map(&b->map, MAP_WIDTH, MAP_HEIGHT);
+    fill_map(&b->large, 4096, 2048);
+    if (!b->map.luminance || !b->large.luminance || !illuminant("FL8", &b->lamp, err) || !band_set_shipped(6, &b->bands, err) ||
         !fill_display(&b->display, err) ||
         !material_chart("chart", palette, names, 24, 6, 4, 0.1, 0, &b->material, err) ||
         !median_cut(&b->map, CUT_VARIANCE, 32, &b->lights, err) ||
