@@ -69,6 +69,9 @@ static const struct setting tracker_rows[] = {
 static const struct setting display_rows[] = {
     {"model", SETTING_TEXT, AT(display.model), ROOM(display.model), 0, 0, "", NULL, "",
      "File of the fitted display model (boothcal display fit); empty: none yet."},
+    {"view", SETTING_TEXT, AT(display.view), ROOM(display.view), 0, 0, "", NULL, "",
+     "File of the display's fitted dependence on direction and place (boothcal display view); "
+     "empty: none, colours hold along the normal of the screen's centre."},
     {"bits", SETTING_ENUM, AT(display.bits_choice), 0, 0, 0, "", bits_names, "8",
      "Bits per channel that the display takes."},
     {"dither", SETTING_BOOL, AT(display.dither), 0, 0, 0, "", NULL, "yes",

@@ -72,6 +72,7 @@ struct booth_settings {
     } radiometer;
     struct {
         char model[512]; // fitted display model, "" = none
+        char view[512];  // fitted dependence on direction and place, "" = none
         int bits_choice; // see booth_bits
         bool dither;
         double reflectance; // diffuse, of the screen's surface, 0..0.2

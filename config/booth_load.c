@@ -23,7 +23,7 @@ struct path_field {
     size_t size;
 };
 
-enum { PATH_FIELDS = 11 };
+enum { PATH_FIELDS = 12 };
 
 static void path_fields(struct booth_settings *b, struct path_field out[PATH_FIELDS])
 {
@@ -35,6 +35,7 @@ static void path_fields(struct booth_settings *b, struct path_field out[PATH_FIE
         FIELD("accelerometer", "port", b->accelerometer.options.port),
         FIELD("radiometer", "port", b->radiometer.options.port),
         FIELD("display", "model", b->display.model),
+        FIELD("display", "view", b->display.view),
         FIELD("lamps", "folder", b->lamps.folder),
         FIELD("materials", "folder", b->materials.folder),
         FIELD("materials", "show", b->materials.show),

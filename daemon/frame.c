@@ -10,6 +10,9 @@ static const double LEVEL_SEEN = 5e-4;
 // At 45 degrees the light on the screen changes by 0.03 % over it.
 static const double TILT_SEEN_DEG = 0.02;
 
+// A display whose light falls by half at 40 degrees changes by 0.1 % over it.
+static const double EYE_SEEN_M = 5e-4;
+
 static const int64_t TRY_AGAIN_NS = NS_PER_S;
 
 struct state still(const struct state *shown, const struct state *now)
@@ -22,7 +25,8 @@ struct state still(const struct state *shown, const struct state *now)
         out.lamp.level = shown->lamp.level;
     if (!tilt)
         out.tilt.deg = shown->tilt.deg;
-    if (!lamp && !level && !tilt)
+    bool eye = vec3_length(vec3_sub(now->eye.at, shown->eye.at)) > EYE_SEEN_M;
+    if (!lamp && !level && !tilt && !eye)
         out.eye.at = shown->eye.at;
     return out;
 }

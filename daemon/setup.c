@@ -7,6 +7,7 @@
 
 #include "config/display_file.h"
 #include "config/paths.h"
+#include "config/view_file.h"
 
 static const double CONDITION_WARNING = 10;
 
@@ -16,6 +17,10 @@ static bool load_display(struct setup *s, struct error *err)
     if (!path_exists(s->settings.display.model))
         return true;
     s->has_display = display_load(s->settings.display.model, &s->display, NULL, err);
+    if (s->has_display && path_exists(s->settings.display.view)) {
+        s->has_view = view_load(s->settings.display.view, &s->view, NULL, err);
+        return s->has_view;
+    }
     return s->has_display;
 }
 
@@ -195,6 +200,7 @@ bool setup_scene(struct setup *s, const struct state *state, struct scene *out, 
         .eye = state->eye.at,
         .screen_reflectance = b->display.reflectance,
         .display = s->has_display ? &s->display : NULL,
+        .view = s->has_view ? &s->view : NULL,
         .display_generation = s->display_generation,
         .bits = booth_bits(b),
         .dither = b->display.dither,
@@ -230,6 +236,11 @@ bool setup_warning(const struct setup *s, int index, char *text, size_t size)
             snprintf(text, size, "the display model %s is not there yet", b->display.model);
         else
             snprintf(text, size, "the settings name no display model");
+        return true;
+    }
+    if (s->has_display && *b->display.view && !s->has_view && index-- == 0) {
+        snprintf(text, size, "the display's dependence on the angle, %s, is not there yet",
+                 b->display.view);
         return true;
     }
     if (s->has_display && s->display.condition > CONDITION_WARNING && index-- == 0) {

@@ -26,7 +26,9 @@ struct setup {
     struct band_set bands;
     bool has_display;
     struct display_model display;
-    uint64_t display_generation;
+    bool has_view;
+    struct display_view view;
+    uint64_t display_generation; // of both
     struct lamps lamps;
     struct light_points *lights; // per lamp; count 0 without a luminance map
     uint64_t lights_generation;  // of lamp 0; lamp i has i more

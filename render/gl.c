@@ -10,11 +10,12 @@
 #include "render/renderer.h"
 
 // A texture's number is also its unit.
-enum texture { LIGHTS, ILLUMINANCE, TEXELS, PLACES, CURVES, RANKS, EMITTED, COUNTS, TEXTURE_COUNT };
+enum texture { LIGHTS, ILLUMINANCE, TEXELS, PLACES, CURVES, RANKS, VIEW, EMITTED, COUNTS, TEXTURE_COUNT };
 
 static const char *const SAMPLERS[] = {
     [LIGHTS] = "lights", [ILLUMINANCE] = "illuminance", [TEXELS] = "texels",
     [PLACES] = "places", [CURVES] = "curves",           [RANKS] = "ranks",
+    [VIEW] = "view_places",
 };
 
 enum { LIGHTS_A_ROW = 64 };
@@ -193,7 +194,14 @@ static bool same_texels(const struct scene *a, const struct scene *b)
 
 static bool same_display(const struct scene *a, const struct scene *b)
 {
-    return a->display == b->display && a->display_generation == b->display_generation;
+    return a->display == b->display && a->view == b->view &&
+           a->display_generation == b->display_generation;
+}
+
+// Without a view the light of a pixel is the same in every direction.
+static bool same_eye(const struct scene *a, const struct scene *b)
+{
+    return !a->view || (a->eye.x == b->eye.x && a->eye.y == b->eye.y && a->eye.z == b->eye.z);
 }
 
 static bool same_scene(const struct scene *a, const struct scene *b)
@@ -209,7 +217,7 @@ static bool same_scene(const struct scene *a, const struct scene *b)
         break;
     }
     return same_lights(a, b) && same_places(a, b) && same_texels(a, b) && same_display(a, b) &&
-           a->level == b->level && a->dither == b->dither &&
+           same_eye(a, b) && a->level == b->level && a->dither == b->dither &&
            a->screen_reflectance == b->screen_reflectance && a->white.X == b->white.X &&
            a->white.Y == b->white.Y && a->white.Z == b->white.Z;
 }
@@ -299,6 +307,21 @@ static bool texel_stage(struct renderer *r, const struct scene *scene, struct er
     return true;
 }
 
+static void upload_view(struct renderer *r, const struct display_view *view)
+{
+    float nodes[VIEW_DENSE * VIEW_DENSE][VIEW_CHANNELS];
+    float angles[VIEW_CHANNELS * VIEW_TERMS];
+    for (int i = 0; i < VIEW_DENSE * VIEW_DENSE; i++)
+        for (int c = 0; c < VIEW_CHANNELS; c++)
+            nodes[i][c] = (float)view->dense[c][i / VIEW_DENSE][i % VIEW_DENSE];
+    for (int i = 0; i < VIEW_CHANNELS * VIEW_TERMS; i++)
+        angles[i] = (float)view->angle[i / VIEW_TERMS][i % VIEW_TERMS];
+    upload(r, VIEW, GL_RGBA32F, VIEW_DENSE, VIEW_DENSE, GL_RGBA, GL_FLOAT, nodes);
+    glUseProgram(r->frame_program);
+    glUniform1fv(at(r->frame_program, "view_angles"), VIEW_CHANNELS * VIEW_TERMS, angles);
+    glUniform1f(at(r->frame_program, "view_sine_most"), (float)view->sine_most);
+}
+
 static void display_stage(struct renderer *r, const struct scene *scene)
 {
     if (r->seen_display && same_display(&r->seen, scene))
@@ -315,7 +338,20 @@ static void display_stage(struct renderer *r, const struct scene *scene)
     upload(r, CURVES, GL_R32F, DISPLAY_NODES, 3, GL_RED, GL_FLOAT, curves);
     glUseProgram(r->frame_program);
     glUniform3fv(at(r->frame_program, "from_xyz"), 3, rows[0]);
+    if (scene->view)
+        upload_view(r, scene->view);
     glUniform3f(at(r->frame_program, "black"), (float)black.X, (float)black.Y, (float)black.Z);
+}
+
+static void view_uniforms(GLuint program, const struct scene *scene)
+{
+    const struct screen *s = &scene->screen;
+    struct vec3 eye = rigid_apply(rigid_inverse(scene->booth_from_screen), scene->eye);
+    glUniform1i(at(program, "viewed"), scene->view != NULL);
+    glUniform3f(at(program, "eye"), (float)eye.x, (float)eye.y, (float)eye.z);
+    glUniform2f(at(program, "pixel_m"), (float)(s->width_m / s->width_px),
+                (float)(s->height_m / s->height_px));
+    glUniform2f(at(program, "corner_m"), (float)(-s->width_m / 2), (float)(-s->height_m / 2));
 }
 
 static void frame_stage(struct renderer *r, const struct scene *scene)
@@ -329,6 +365,7 @@ static void frame_stage(struct renderer *r, const struct scene *scene)
     glUniform1f(at(program, "code_most"), (float)((1 << r->code_bits) - 1));
     glUniform1i(at(program, "dithered"), scene->dither);
     glUniform1i(at(program, "height"), r->height);
+    view_uniforms(program, scene);
     glUniform1f(at(program, "tolerance"), (float)DISPLAY_GAMUT_TOLERANCE);
     draw(program, r->frame_target, r->width, r->height);
     r->surface = true;

@@ -26,6 +26,9 @@ struct pixel reference_pixel(const struct scene *scene, int x_px, int y_px)
     out.emitted.X = emitted_of(scene, out.surface.X, scene->white.X, out.illuminance);
     out.emitted.Y = emitted_of(scene, out.surface.Y, scene->white.Y, out.illuminance);
     out.emitted.Z = emitted_of(scene, out.surface.Z, scene->white.Z, out.illuminance);
-    out.inverse = display_invert(scene->display, out.emitted);
+    out.asked = scene->view ? display_view_ask(scene->display, scene_gains(scene, x_px, y_px),
+                                               out.emitted)
+                            : out.emitted;
+    out.inverse = display_invert(scene->display, out.asked);
     return out;
 }

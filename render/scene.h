@@ -6,7 +6,7 @@
 
 #include <stdint.h>
 
-#include "colorimetry/display.h"
+#include "colorimetry/display_view.h"
 #include "render/lights.h"
 #include "render/stand.h"
 
@@ -42,7 +42,8 @@ struct scene {
     double screen_reflectance; // diffuse, 0..0.2 (0.002)
 
     const struct display_model *display;
-    uint64_t display_generation;
+    const struct display_view *view; // NULL: the model holds everywhere
+    uint64_t display_generation;     // of both
     int bits; // of the display's input, 8 or 10
     bool dither;
 };
@@ -52,8 +53,13 @@ struct pixel {
     double illuminance; // lux on the screen plane there
     struct xyz surface; // cd/m2 that the surface would send
     struct xyz emitted; // surface less the screen's own reflection
+    struct xyz asked;   // of the display model, so that emitted leaves towards the eye
     struct display_inverse inverse;
 };
+
+// Gains of the display at a pixel for the scene's eye; all 1 without a view.
+// The formula of an eye at the place of a pixel itself: along the normal.
+struct view_gains scene_gains(const struct scene *scene, int x_px, int y_px);
 
 // The nearest texel of a SURFACE scene at a pixel's column or row, -1 outside
 // the material: there the screen is black and nothing is out of gamut.

@@ -12,6 +12,12 @@ uniform vec3 white;
 uniform float screen_reflectance;
 uniform vec3 black;      // of the display, cd/m2
 uniform vec3 from_xyz[3]; // rows: XYZ less black to linear light
+uniform bool viewed;       // whether direction and place count
+uniform vec3 eye;          // in the screen's frame, m
+uniform vec2 pixel_m;      // size of a pixel
+uniform vec2 corner_m;     // bottom left corner of the screen
+uniform float view_angles[24]; // red, green, blue, black: six terms each
+uniform float view_sine_most;
 uniform float code_most; // 255 or 1023
 uniform bool dithered;
 uniform int height;
@@ -40,6 +46,22 @@ float code_of(int channel, float linear, ivec2 pixel, ivec2 shift)
            code_most;
 }
 
+// Gains of red, green, blue and black towards the eye.
+vec4 gains_at(ivec2 from_below)
+{
+    vec3 to_eye = eye - vec3(corner_m + (vec2(from_below) + 0.5) * pixel_m, 0.0);
+    vec2 d = to_eye.xy / length(to_eye);
+    d *= view_held(d.x, d.y, view_sine_most);
+    vec2 place = (vec2(from_below) + 0.5) * pixel_m / (-2.0 * corner_m);
+    vec4 gains;
+    for (int c = 0; c < 4; c++)
+        gains[c] = view_angle(view_angles[6 * c], view_angles[6 * c + 1], view_angles[6 * c + 2],
+                              view_angles[6 * c + 3], view_angles[6 * c + 4],
+                              view_angles[6 * c + 5], d.x, d.y) *
+                   view_place(c, place.x, 1.0 - place.y);
+    return gains;
+}
+
 void main()
 {
     ivec2 from_below = ivec2(gl_FragCoord.xy);
@@ -55,10 +77,14 @@ void main()
     vec3 relative = texelFetch(texels, ivec2(column, row), 0).rgb;
     vec3 target = vec3(emitted_of(relative.x, white.x, lux), emitted_of(relative.y, white.y, lux),
                        emitted_of(relative.z, white.z, lux));
-    vec3 d = target - black;
+    vec4 gains = viewed ? gains_at(from_below) : vec4(1.0);
+    vec3 d = target - black * gains.a;
     float r = display_inverse_row(from_xyz[0].x, from_xyz[0].y, from_xyz[0].z, d.x, d.y, d.z);
     float g = display_inverse_row(from_xyz[1].x, from_xyz[1].y, from_xyz[1].z, d.x, d.y, d.z);
     float b = display_inverse_row(from_xyz[2].x, from_xyz[2].y, from_xyz[2].z, d.x, d.y, d.z);
+    r /= gains.r;
+    g /= gains.g;
+    b /= gains.b;
     bool outside = display_outside(r, tolerance) || display_outside(g, tolerance) ||
                    display_outside(b, tolerance);
     emitted = vec4(target, outside ? 1.0 : 0.0);

@@ -29,7 +29,7 @@ static void noise_below_what_is_seen_changes_nothing(void **state)
     struct state shown = standing_still(), now = shown;
     now.lamp.level *= 1.0004;
     now.tilt.deg += 0.019;
-    now.eye.at.x = 0.3;
+    now.eye.at.x = 0.0004;
     struct state s = still(&shown, &now);
     assert_near(s.lamp.level, 0.8, 0);
     assert_near(s.tilt.deg, 30, 0);
@@ -47,6 +47,9 @@ static void what_is_seen_comes_through_and_takes_the_rest_along(void **state)
     assert_near(s.tilt.deg, 30.03, EXACT);
     assert_near(s.lamp.level, 0.8, 0);
     assert_near(s.eye.at.x, 0.3, 0);
+    now = shown;
+    now.eye.at.x = 0.0006; // the display's light falls with the angle
+    assert_near(still(&shown, &now).eye.at.x, 0.0006, EXACT);
     now = shown;
     now.lamp.level *= 1.001;
     assert_near(still(&shown, &now).lamp.level, 0.8008, EXACT);

@@ -14,6 +14,7 @@ struct surface {
     struct luminance_map map;
     struct light_points lights;
     struct display_model display;
+    struct display_view view; // of surface_view
     float texels[SURFACE_COLUMNS * SURFACE_ROWS][3];
     struct scene scene;
 };
@@ -71,6 +72,28 @@ static inline void surface_init(struct surface *s)
     surface_paint(s, false);
     surface_light(s, tubes, 32);
     surface_tilt(s, 30);
+}
+
+// A display whose light falls with the angle, to the left more than to the
+// right, and towards its corners; its black rises.
+static inline void surface_view(struct surface *s, struct vec3 eye)
+{
+    static const double fall[VIEW_CHANNELS] = {-1.6, -1.5, -1.9, 2.5};
+    struct error err = {0};
+    display_view_none(&s->view);
+    s->view.sine_most = 0.7;
+    for (int c = 0; c < VIEW_CHANNELS; c++) {
+        const double a[VIEW_TERMS] = {0.05, -0.02, fall[c], 0.1, 0.9 * fall[c], -0.3};
+        memcpy(s->view.angle[c], a, sizeof a);
+        for (int i = 0; i < VIEW_GRID; i++)
+            for (int j = 0; j < VIEW_GRID; j++)
+                s->view.place[c][i][j] =
+                    1 - 0.01 * (c + 1) * ((i - 2) * (i - 2) + 0.5 * (j - 2) * (j - 2) - 0.2 * (j - 2));
+    }
+    assert_good(display_view_prepare(&s->view, &err), err);
+    s->scene.view = &s->view;
+    s->scene.eye = eye;
+    s->scene.display_generation++;
 }
 
 static inline void surface_fini(struct surface *s)

@@ -125,6 +125,45 @@ static void every_pixel_agrees_with_the_reference_over_tilts_lamps_and_levels(vo
     surface_fini(&s);
 }
 
+static void every_pixel_agrees_with_the_reference_from_every_eye(void **state)
+{
+    (void)state;
+    static const struct vec3 eyes[] = {{0, 0.55, 0.65}, {-0.4, 0.5, 0.6}, {0.3, 0.9, 0.2},
+                                       {1.5, 0.3, 0.1}, {0, -0.5, 0.4}}; // the last two beyond all
+    static const double tilts[] = {0, 30, 75};
+    struct surface s;
+    surface_init(&s);
+    for (size_t e = 0; e < sizeof eyes / sizeof *eyes; e++) {
+        surface_view(&s, eyes[e]);
+        for (size_t t = 0; t < sizeof tilts / sizeof *tilts; t++) {
+            surface_tilt(&s, tilts[t]);
+            compare(&s.scene);
+        }
+    }
+    surface_fini(&s);
+}
+
+static void an_eye_that_moves_is_drawn_for_only_where_the_angle_counts(void **state)
+{
+    (void)state;
+    struct surface s;
+    struct error err = {0};
+    bool drawn = false;
+    if (!renderer)
+        skip();
+    surface_init(&s);
+    show(&s.scene);
+    s.scene.eye.x += 0.1;
+    assert_good(renderer_show(renderer, &s.scene, false, &drawn, &err), err);
+    assert_false(drawn);
+    surface_view(&s, s.scene.eye);
+    show(&s.scene);
+    s.scene.eye.x += 0.1;
+    assert_good(renderer_show(renderer, &s.scene, false, &drawn, &err), err);
+    assert_true(drawn);
+    surface_fini(&s);
+}
+
 static void from_one_to_4096_lights_agree_with_the_reference(void **state)
 {
     (void)state;
@@ -413,6 +452,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_pixel_agrees_with_the_reference_over_tilts_lamps_and_levels),
+        cmocka_unit_test(every_pixel_agrees_with_the_reference_from_every_eye),
+        cmocka_unit_test(an_eye_that_moves_is_drawn_for_only_where_the_angle_counts),
         cmocka_unit_test(from_one_to_4096_lights_agree_with_the_reference),
         cmocka_unit_test(a_screen_through_the_ceiling_is_dark_above_it_and_finite_everywhere),
         cmocka_unit_test(a_lifted_screen_face_down_or_above_the_lamp_is_black),
