@@ -227,6 +227,20 @@ bool bench_aim_screen(struct bench *b, double x_px, double y_px, struct error *e
                    err, please);
 }
 
+bool bench_aim_screen_from(struct bench *b, double x_px, double y_px, struct vec3 from,
+                           struct error *err)
+{
+    char please[192];
+    snprintf(please, sizeof please,
+             "Bring the radiometer to x %.3f, y %.3f, z %.3f m and aim it at the screen, pixel %.0f, "
+             "%.0f",
+             from.x, from.y, from.z, x_px, y_px);
+    return by_hand(b,
+                   json_pack("{ss,ss,sf,sf,s[fff]}", "do", CONTROL_AIM, "target", "screen", "x_px",
+                             x_px, "y_px", y_px, "from_m", from.x, from.y, from.z),
+                   err, please);
+}
+
 bool bench_aim_ceiling(struct bench *b, double x_m, double z_m, struct error *err)
 {
     char please[128];

@@ -75,6 +75,9 @@ bool bench_lamp(struct bench *b, const char *lamp, struct error *err); // "none"
 bool bench_tilt(struct bench *b, double deg, struct error *err);
 bool bench_head(struct bench *b, struct vec3 eye, struct error *err);
 bool bench_aim_screen(struct bench *b, double x_px, double y_px, struct error *err);
+// The same from a place in the booth's frame: an instrument where the eye is.
+bool bench_aim_screen_from(struct bench *b, double x_px, double y_px, struct vec3 from,
+                           struct error *err);
 bool bench_aim_ceiling(struct bench *b, double x_m, double z_m, struct error *err);
 
 // Absolute XYZ (cd/m2) that physical samples of those reflectances would send

@@ -11,6 +11,7 @@
 #include "calibration/display_fit.h"
 #include "calibration/display_measure.h"
 #include "calibration/lines.h"
+#include "calibration/view_measure.h"
 #include "config/display_file.h"
 
 // ---- fit -------------------------------------------------------------------
@@ -353,6 +354,23 @@ int command_display(int argc, char **argv)
          "\n"
          "Exit 3: done, with a warning (the display was not warm or not settled, white drifted\n"
          "by more than 3 %)."},
+        {"view", view_measure, "--config FILE -o VIEW.ini [OPTION]...",
+         "How the display's light depends on the direction it is seen from and on the place on\n"
+         "      the screen: measures five patches from each, fits, goes on where it was interrupted.\n"
+         "\n"
+         "  --config FILE    boothd's settings\n"
+         "  --socket PATH    boothd's control socket (default: the settings', else the user's)\n"
+         "  --booth PATH     control socket of an emulated booth\n"
+         "  --angles A,B,C   degrees off the normal, rising, 5..75 (15,30,45)\n"
+         "  --azimuths N     directions at each angle, 4..36 (6)\n"
+         "  --distance M     from the screen to the instrument, 0.1..3 m (0.6)\n"
+         "  --no-places      directions only, at the screen's centre\n"
+         "  --from JOURNAL   fits what was measured before; no booth is needed\n"
+         "  --json           what was found as one JSON object\n"
+         "  -o VIEW.ini      where the result goes; VIEW.ini.journal holds every reading\n"
+         "  --help\n"
+         "\n"
+         "Exit 3: done, with a warning (white is left more than 1 CIEDE2000 off in some direction)."},
         {"fit", command_fit, "TRAIN.ti3 -o D.ini",
          "Fits three curves and a 3x4 matrix to measured patches.\n"
          "\n"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration/journal.h"
 
+#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
@@ -24,12 +25,12 @@ static bool take_line(struct journal *j, char *text, int number, struct error *e
     return true;
 }
 
-// What lies behind the last whole line goes.
-static bool read_lines(struct journal *j, struct error *err)
+// *whole (may be NULL): bytes up to the end of the last whole line.
+static bool read_lines(struct journal *j, long *whole, struct error *err)
 {
     char *text = NULL;
     size_t room = 0;
-    long whole = 0;
+    long all = 0;
     bool fine = true;
     rewind(j->stream);
     for (int number = 1; fine; number++) {
@@ -37,12 +38,30 @@ static bool read_lines(struct journal *j, struct error *err)
         if (length <= 0 || text[length - 1] != '\n')
             break;
         fine = take_line(j, text, number, err);
-        whole += length;
+        all += length;
     }
     free(text);
-    if (fine && (ftruncate(fileno(j->stream), whole) || fseek(j->stream, whole, SEEK_SET)))
-        fine = fail_errno(err, "%s", j->path);
+    if (whole)
+        *whole = all;
     return fine;
+}
+
+bool journal_read(struct journal *j, const char *path, struct error *err)
+{
+    *j = (struct journal){.stream = fopen(path, "re"), .lines = json_array()};
+    snprintf(j->path, sizeof j->path, "%s", path);
+    bool fine = j->stream
+                    ? read_lines(j, NULL, err)
+                    : fail(err, ERROR_CONFIG, "%s: cannot be read: %s", path, strerror(errno));
+    if (fine && !j->head)
+        fine = fail(err, ERROR_DATA, "%s: is an empty journal", path);
+    if (!fine) {
+        journal_close(j);
+        return false;
+    }
+    fclose(j->stream);
+    j->stream = NULL;
+    return true;
 }
 
 static bool put(struct journal *j, const json_t *line, struct error *err)
@@ -56,11 +75,14 @@ static bool put(struct journal *j, const json_t *line, struct error *err)
 bool journal_open(struct journal *j, const char *path, json_t *head, struct error *err)
 {
     *j = (struct journal){.stream = fopen(path, "a+e"), .lines = json_array()};
+    long whole = 0;
     snprintf(j->path, sizeof j->path, "%s", path);
     bool fine = j->stream || fail_errno(err, "%s", path);
     if (fine && flock(fileno(j->stream), LOCK_EX | LOCK_NB))
         fine = fail(err, ERROR_RETRY, "%s: another program is writing it", path);
-    fine = fine && read_lines(j, err);
+    fine = fine && read_lines(j, &whole, err);
+    if (fine && (ftruncate(fileno(j->stream), whole) || fseek(j->stream, whole, SEEK_SET)))
+        fine = fail_errno(err, "%s", path); // what lies behind the last whole line goes
     if (fine && !j->head) {
         j->head = json_incref(head);
         fine = put(j, head, err);

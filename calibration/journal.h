@@ -10,7 +10,7 @@
 #include "base/error.h"
 
 struct journal {
-    FILE *stream;
+    FILE *stream;  // NULL: only read
     json_t *head;  // object
     json_t *lines; // array of objects: what was there, then what is added
     char path[512];
@@ -20,6 +20,9 @@ struct journal {
 // its end is cut off. Errors: DATA for a line that is no JSON object, naming
 // file and line; SYSTEM; RETRY when another program has it open.
 bool journal_open(struct journal *j, const char *path, json_t *head, struct error *err);
+
+// Reads a journal that nobody goes on with; nothing may be added.
+bool journal_read(struct journal *j, const char *path, struct error *err);
 
 // Writes a line and waits until it is on disk. Takes over `line`.
 bool journal_add(struct journal *j, json_t *line, struct error *err);

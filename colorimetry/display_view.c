@@ -65,7 +65,7 @@ static bool sound(double gain)
 
 static double angle_gain(const double a[VIEW_TERMS], double u, double v)
 {
-    return view_angle(a[0], a[1], a[2], a[3], a[4], a[5], u, v);
+    return view_angle(a[0], a[1], a[2], a[3], a[4], a[5], a[6], u, v);
 }
 
 static bool check_angles(const struct display_view *view, int c, struct error *err)

@@ -31,10 +31,12 @@ VIEW_PURE real view_held(real u, real v, real sine_most)
 
 // Gain over that along the normal, of a direction to the eye whose cosines
 // with the screen's x and y are u and v.
-VIEW_PURE real view_angle(real a0, real a1, real a2, real a3, real a4, real a5, real u, real v)
+VIEW_PURE real view_angle(real a0, real a1, real a2, real a3, real a4, real a5, real a6,
+                          real u, real v)
 {
     real s = u * u + v * v;
-    return view_exp(a0 * u + a1 * v + a2 * u * u + a3 * u * v + a4 * v * v + a5 * s * s);
+    return view_exp(a0 * u + a1 * v + a2 * u * u + a3 * u * v + a4 * v * v + a5 * s * s +
+                    a6 * s * s * s);
 }
 
 // Gain over that of the centre at a place 0..1 from the left and from the top:

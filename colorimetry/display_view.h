@@ -5,9 +5,9 @@
 // there and back. The scalar steps stand in display_view.glsl.
 //
 //   XYZ(u, v, x, y) = M (g_r r, g_g g, g_b b) + g_k black
-//   g_c = place_c(x, y) exp(a0 u + a1 v + a2 u^2 + a3 u v + a4 v^2 + a5 (u^2 + v^2)^2)
+//   g_c = place_c(x, y) exp(a0 u + a1 v + a2 u^2 + a3 u v + a4 v^2 + a5 s^2 + a6 s^3)
 //
-// u, v: cosines of the direction to the eye with the screen's x (right) and y
+// s = u^2 + v^2; u, v: cosines of the direction to the eye with the screen's x (right) and y
 // (up); x, y: 0..1 from the left and from the top; M, r, g, b: matrix and linear
 // light of the display model.
 #ifndef COLORIMETRY_DISPLAY_VIEW_H
@@ -17,7 +17,7 @@
 
 enum {
     VIEW_CHANNELS = 4, // red, green, blue, black
-    VIEW_TERMS = 6,
+    VIEW_TERMS = 7,
     VIEW_GRID = 5,
     VIEW_DENSE = 33
 };

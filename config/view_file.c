@@ -13,7 +13,7 @@ struct view_text {
 #define ANGLE(name, channel, what)                                                                 \
     {                                                                                              \
         name, SETTING_VECTOR, AT(view.angle[channel]), VIEW_TERMS, -1e3, 1e3, "", NULL, NULL,      \
-            "ln of " what "'s gain: factors of u, v, u2, uv, v2, (u2+v2)2; u, v: cosines of the "  \
+            "ln of " what "'s gain: factors of u, v, u2, uv, v2, s2, s3; s = u2 + v2; u, v: cosines of the "  \
             "direction with the screen's x (right), y (up)."                                       \
     }
 #define PLACE(name, channel, what)                                                                 \

@@ -16,7 +16,7 @@ uniform bool viewed;       // whether direction and place count
 uniform vec3 eye;          // in the screen's frame, m
 uniform vec2 pixel_m;      // size of a pixel
 uniform vec2 corner_m;     // bottom left corner of the screen
-uniform float view_angles[24]; // red, green, blue, black: six terms each
+uniform float view_angles[28]; // red, green, blue, black: seven terms each
 uniform float view_sine_most;
 uniform float code_most; // 255 or 1023
 uniform bool dithered;
@@ -55,9 +55,9 @@ vec4 gains_at(ivec2 from_below)
     vec2 place = (vec2(from_below) + 0.5) * pixel_m / (-2.0 * corner_m);
     vec4 gains;
     for (int c = 0; c < 4; c++)
-        gains[c] = view_angle(view_angles[6 * c], view_angles[6 * c + 1], view_angles[6 * c + 2],
-                              view_angles[6 * c + 3], view_angles[6 * c + 4],
-                              view_angles[6 * c + 5], d.x, d.y) *
+        gains[c] = view_angle(view_angles[7 * c], view_angles[7 * c + 1], view_angles[7 * c + 2],
+                              view_angles[7 * c + 3], view_angles[7 * c + 4],
+                              view_angles[7 * c + 5], view_angles[7 * c + 6], d.x, d.y) *
                    view_place(c, place.x, 1.0 - place.y);
     return gains;
 }

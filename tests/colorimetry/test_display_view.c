@@ -49,7 +49,7 @@ static struct display_view some_view(void)
     display_view_none(&v);
     v.sine_most = 0.7;
     for (int c = 0; c < VIEW_CHANNELS; c++) {
-        const double a[VIEW_TERMS] = {0.04, -0.02, -1.5 - 0.1 * c, 0.2, -1.4, -0.3};
+        const double a[VIEW_TERMS] = {0.04, -0.02, -1.5 - 0.1 * c, 0.2, -1.4, -0.3, 0.1};
         memcpy(v.angle[c], a, sizeof a);
         for (int i = 0; i < VIEW_GRID; i++)
             for (int j = 0; j < VIEW_GRID; j++)

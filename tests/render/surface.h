@@ -83,7 +83,7 @@ static inline void surface_view(struct surface *s, struct vec3 eye)
     display_view_none(&s->view);
     s->view.sine_most = 0.7;
     for (int c = 0; c < VIEW_CHANNELS; c++) {
-        const double a[VIEW_TERMS] = {0.05, -0.02, fall[c], 0.1, 0.9 * fall[c], -0.3};
+        const double a[VIEW_TERMS] = {0.05, -0.02, fall[c], 0.1, 0.9 * fall[c], -0.3, 0.1};
         memcpy(s->view.angle[c], a, sizeof a);
         for (int i = 0; i < VIEW_GRID; i++)
             for (int j = 0; j < VIEW_GRID; j++)
