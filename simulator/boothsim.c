@@ -237,6 +237,7 @@ static bool plug_in(struct booth *b, struct error *err)
         .inclinometer_port = s->inclinometer.port,
         .seed = (uint64_t)s->world.seed,
         .radiometer_hurry = s->radiometer.hurry,
+        .radiometer_lapses = {s->radiometer.drift, s->radiometer.misread_every},
         .collector_mm2 = s->spectrometer.collector_mm2,
         .calibration_error = s->spectrometer.calibration_error,
         .camera_pitch_deg = s->camera.pitch_deg,

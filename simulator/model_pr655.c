@@ -14,6 +14,7 @@
 
 enum status {
     STATUS_OK = 0,
+    STATUS_NOT_CONSTANT = -1,
     STATUS_OVERLOAD = -2,
     STATUS_WEAK = -8,
     STATUS_ILLEGAL = -1000,
@@ -47,8 +48,6 @@ enum { LINE_MOST = 64, OUT_MOST = 8192, BANDPASS_NM = 8, SAMPLES = 16 };
 #define READ_ELECTRONS 20.0
 #define REPEAT_ALL 0.001      // relative, common to all points of a reading
 #define REPEAT_POINT 0.0005   // relative, each point by itself
-#define DRIFT 0.01            // relative, a reading
-#define MISREAD 0.10          // relative
 #define EXPOSURE_LEAST_MS 3.0
 #define EXPOSURE_MOST_MS 6000.0
 #define OVERHEAD_MS 300.0     // shutter, dark reading, arithmetic
@@ -60,8 +59,7 @@ struct pr655 {
     char serial[32];
     bool remote, echo;
     int upset;
-    enum pr655_lie lie;
-    int lies; // readings since
+    struct lapse lapse;
 
     char line[LINE_MOST];
     size_t line_size;
@@ -91,6 +89,7 @@ struct pr655 *pr655_create(const struct pr655_options *options)
     d->options = *options;
     snprintf(d->serial, sizeof(d->serial), "%s", options->serial);
     noise_init(&d->noise, options->seed, 'r');
+    d->lapse.rates = options->lapses;
     d->averages = 1;
     d->last_code = DATA_YXY;
     return d;
@@ -106,19 +105,9 @@ void pr655_upset(struct pr655 *device, int status)
     device->upset = status;
 }
 
-void pr655_lie(struct pr655 *device, enum pr655_lie lie)
+void pr655_lapse(struct pr655 *device, enum lapse_kind kind)
 {
-    if (device->lie != lie)
-        device->lies = 0;
-    device->lie = lie;
-}
-
-static double lie_about(struct pr655 *d)
-{
-    int told = d->lies++;
-    if (d->lie == PR655_DRIFTING)
-        return pow(1 + DRIFT, told + 1);
-    return d->lie == PR655_MISREADING && told % 3 == 0 ? 1 + MISREAD : 1;
+    lapse_set(&device->lapse, kind);
 }
 
 __attribute__((format(printf, 2, 3))) static void say(struct pr655 *d, const char *format, ...)
@@ -189,7 +178,7 @@ static void take_samples(struct pr655 *d, int64_t now_ns)
 
 static int finish_exposure(struct pr655 *d)
 {
-    double mean[PR655_POINTS];
+    double mean[PR655_POINTS], lapse;
     int at;
     for (int i = 0; i < PR655_POINTS; i++)
         mean[i] = d->sum[i] / d->samples;
@@ -201,10 +190,12 @@ static int finish_exposure(struct pr655 *d)
         return STATUS_OVERLOAD;
     if (fill < FILL_LEAST)
         return STATUS_WEAK;
+    if (!lapse_next(&d->lapse, &lapse))
+        return STATUS_NOT_CONSTANT;
 
     double electrons_per_radiance = fill_per_radiance * WELL_ELECTRONS * d->averages;
     double read2 = READ_ELECTRONS * READ_ELECTRONS * d->averages;
-    double common = (1 + REPEAT_ALL * noise_normal(&d->noise)) * lie_about(d);
+    double common = (1 + REPEAT_ALL * noise_normal(&d->noise)) * lapse;
     for (int i = 0; i < PR655_POINTS; i++) {
         double electrons = mean[i] * electrons_per_radiance;
         electrons += sqrt(electrons + read2) * noise_normal(&d->noise);

@@ -6,6 +6,7 @@
 #define SIMULATOR_MODEL_PR655_H
 
 #include "simulator/around.h"
+#include "simulator/model_lapse.h"
 
 enum { PR655_FIRST_NM = 380, PR655_STEP_NM = 4, PR655_POINTS = 101 };
 
@@ -14,6 +15,7 @@ struct pr655_options {
     const char *serial;
     uint64_t seed;
     double hurry; // divides exposure times, >= 1; the noise stays that of the full exposure
+    struct lapse_rates lapses;
 };
 
 struct pr655;
@@ -33,10 +35,8 @@ size_t pr655_out(struct pr655 *device, int64_t now_ns, char *out, size_t size, i
 // From now on measurements end with this status (such as -1); 0 = as they are.
 void pr655_upset(struct pr655 *device, int status);
 
-enum pr655_lie { PR655_TRUTHFUL, PR655_DRIFTING, PR655_MISREADING };
-
-// DRIFTING: each reading from now on is 1 % above the one before. MISREADING:
-// every third one, the first included, is 10 % too high.
-void pr655_lie(struct pr655 *device, enum pr655_lie lie);
+// How readings go wrong from now on. A misread that is an error ends with -1,
+// as if the light had not been constant.
+void pr655_lapse(struct pr655 *device, enum lapse_kind kind);
 
 #endif

@@ -151,6 +151,9 @@ static const struct setting radiometer_rows[] = {
     DOUBLE(screen_spot_m, 0.0005, 0.5, "m", "0.020", "Diameter of the spot on the screen."),
     DOUBLE(ceiling_spot_m, 0.0005, 0.5, "m", "0.010", "Diameter of the spot on the ceiling."),
     DOUBLE(hurry, 1, 1000, "", "20", "Divides the exposure times."),
+    DOUBLE(drift, 0, 1, "", "0.01",
+           "Fault drift: how much each reading is above the one before, relative."),
+    INT(misread_every, 1, 1000, "", "3", "Fault misread: one reading of so many is false."),
     TEXT(serial, "EMU65501", "Serial number."),
     {0},
 };

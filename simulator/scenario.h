@@ -87,6 +87,8 @@ struct scenario_inclinometer {
 struct scenario_radiometer {
     double screen_spot_m, ceiling_spot_m; // diameters
     double hurry;
+    double drift; // of the faults drift and misread: see model_lapse.h
+    int misread_every;
     char serial[SCENARIO_NAME_SIZE];
 };
 

@@ -283,6 +283,9 @@ static bool check(const struct wire_options *o, struct error *err)
                         o->serial[i] ? o->serial[i] : "");
     if (!(o->radiometer_hurry >= 1))
         return fail(err, ERROR_RANGE, "radiometer_hurry: %g is below 1", o->radiometer_hurry);
+    if (o->radiometer_lapses.misread_every < 1)
+        return fail(err, ERROR_RANGE, "misread_every: %d is below 1",
+                    o->radiometer_lapses.misread_every);
     if (!(o->collector_mm2 > 0))
         return fail(err, ERROR_RANGE, "collector_mm2: %g is not above 0", o->collector_mm2);
     return true;

@@ -12,6 +12,7 @@
 
 #include "base/error.h"
 #include "simulator/around.h"
+#include "simulator/model_lapse.h"
 #include "simulator/model_ooi_kind.h"
 #include "simulator/model_witmotion.h"
 
@@ -71,8 +72,8 @@ enum {
     X(DEVICE_FAILURE, "device-failure", WIRE_ON_MODBUS)                                            \
     X(WEAK_LIGHT, "weak-light", WIRE_ON_SERIAL)  /* every M ends with -8 */                        \
     X(OVERLOAD, "overload", WIRE_ON_SERIAL)      /* every M ends with -2 */                        \
-    X(DRIFT, "drift", WIRE_ON_SERIAL)            /* each reading is 1 % above the one before */    \
-    X(MISREAD, "misread", WIRE_ON_SERIAL)        /* every third reading is 10 % too high */
+    X(DRIFT, "drift", WIRE_ON_SERIAL)            /* readings creep upwards */                      \
+    X(MISREAD, "misread", WIRE_ON_SERIAL)        /* a reading now and then is false */
 
 enum wire_fault {
 #define X(name, text, wires) WIRE_##name,
@@ -93,6 +94,7 @@ struct wire_options {
     int inclinometer_port;      // 0 = any that is free
     uint64_t seed;              // of all noise
     double radiometer_hurry;    // divides the radiometer's exposure times, >= 1
+    struct lapse_rates radiometer_lapses; // of the faults drift and misread
     double collector_mm2;       // of the cosine corrector
     double calibration_error;   // relative slope error of spectrometer.cal over 180 nm, 0 = exact
     double camera_pitch_deg;    // of the camera's axis above the horizon, for its own accelerometer

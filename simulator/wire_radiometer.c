@@ -21,7 +21,8 @@ struct radiometer_end *radiometer_create(const struct wire_options *options, str
     struct pr655_options model = {.around = options->around,
                                   .serial = options->serial[WIRE_RADIOMETER],
                                   .seed = options->seed,
-                                  .hurry = options->radiometer_hurry};
+                                  .hurry = options->radiometer_hurry,
+                                  .lapses = options->radiometer_lapses};
     if (r) {
         noise_init(&r->noise, options->seed, 'p');
         r->model = pr655_create(&model);
@@ -61,9 +62,9 @@ static int64_t serve(void *context, int fd, bool readable, enum wire_fault fault
                           : fault == WIRE_OVERLOAD   ? OVERLOADED
                           : fault == WIRE_WEAK_LIGHT ? TOO_WEAK
                                                      : 0);
-    pr655_lie(r->model, fault == WIRE_DRIFT     ? PR655_DRIFTING
-                        : fault == WIRE_MISREAD ? PR655_MISREADING
-                                                : PR655_TRUTHFUL);
+    pr655_lapse(r->model, fault == WIRE_DRIFT     ? LAPSE_DRIFT
+                          : fault == WIRE_MISREAD ? LAPSE_MISREAD
+                                                  : LAPSE_NONE);
     if (readable)
         hear(r, fd);
     char bytes[CHUNK];

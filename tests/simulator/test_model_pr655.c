@@ -32,7 +32,12 @@ static void shine(void *context, int64_t at_ns, struct spectrum *out)
 static void make(double hurry)
 {
     struct pr655_options options = {
-        .around = {.radiance = shine}, .serial = "EMU65500123", .seed = 11, .hurry = hurry};
+        .around = {.radiance = shine},
+        .serial = "EMU65500123",
+        .seed = 11,
+        .hurry = hurry,
+        .lapses = {.drift = 0.01, .misread_every = 3},
+    };
     pr655_destroy(device);
     device = pr655_create(&options);
     assert_non_null(device);
@@ -233,10 +238,10 @@ static void a_drifting_one_reads_more_each_time(void **state)
     (void)state;
     ask("PHOTO\r");
     double true_Y = read_Y();
-    pr655_lie(device, PR655_DRIFTING);
+    pr655_lapse(device, LAPSE_DRIFT);
     for (int i = 1; i <= 5; i++)
         assert_true(fabs(read_Y() / (true_Y * pow(1.01, i)) - 1) < 2 * BRIGHT);
-    pr655_lie(device, PR655_TRUTHFUL);
+    pr655_lapse(device, LAPSE_NONE);
     assert_true(fabs(read_Y() / true_Y - 1) < 2 * BRIGHT);
 }
 
@@ -245,9 +250,13 @@ static void a_misreading_one_is_wrong_every_third_time(void **state)
     (void)state;
     ask("PHOTO\r");
     double true_Y = read_Y();
-    pr655_lie(device, PR655_MISREADING);
-    for (int i = 0; i < 6; i++)
-        assert_true(fabs(read_Y() / (true_Y * (i % 3 ? 1 : 1.10)) - 1) < 2 * BRIGHT);
+    pr655_lapse(device, LAPSE_MISREAD);
+    const double wrong_by[] = {1.1, 1, 1, 0, 1, 1, 1000, 1, 1}; // 0 = an error
+    for (int i = 0; i < 9; i++)
+        if (wrong_by[i] > 0)
+            assert_true(fabs(read_Y() / (true_Y * wrong_by[i]) - 1) < 2 * BRIGHT);
+        else
+            assert_string_equal(ask("M1\r"), "-0001\r\n");
 }
 
 #define WITH(test) cmocka_unit_test_setup_teardown(test, fresh, gone)

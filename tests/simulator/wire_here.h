@@ -61,6 +61,7 @@ static inline struct wire_options usual(void)
         .serial = {"EMU2+H00417", "EMUWT901", "EMU:WII:01", "EMU65500123"},
         .seed = 1,
         .radiometer_hurry = 100,
+        .radiometer_lapses = {.drift = 0.01, .misread_every = 3},
         .collector_mm2 = 11.95,
     };
 }
