@@ -127,26 +127,17 @@ static gboolean on_write(UMockdevIoctlBase *handler, UMockdevIoctlClient *client
     return TRUE;
 }
 
-static int put(UMockdevIoctlData *arg, size_t size, const void *bytes, size_t count)
-{
-    UMockdevIoctlData *out = umockdev_ioctl_data_resolve(arg, 0, size, NULL);
-    if (!out)
-        return -EFAULT;
-    memcpy(out->data, bytes, count < size ? count : size);
-    g_object_unref(out);
-    return (int)(count < size ? count : size);
-}
-
 static int put_descriptor(const struct hid_model *m, UMockdevIoctlData *arg)
 {
     struct hidraw_report_descriptor text = {.size = (uint32_t)m->descriptor_size};
     memcpy(text.value, m->descriptor, m->descriptor_size);
-    int result = put(arg, sizeof(text), &text, sizeof(text));
+    int result = wire_device_put(arg, sizeof(text), &text, sizeof(text));
     return result < 0 ? result : 0;
 }
 
-static int answer(struct hid_device_emulated *d, UMockdevIoctlClient *client)
+static int answer(void *owner, UMockdevIoctlClient *client)
 {
+    struct hid_device_emulated *d = owner;
     gulong request = umockdev_ioctl_client_get_request(client);
     UMockdevIoctlData *arg = umockdev_ioctl_client_get_arg(client);
     const struct hid_model *m = &d->model;
@@ -154,46 +145,31 @@ static int answer(struct hid_device_emulated *d, UMockdevIoctlClient *client)
         return -ENODEV;
     if (request == HIDIOCGRDESCSIZE) {
         int size = (int)m->descriptor_size;
-        return put(arg, sizeof(size), &size, sizeof(size)) < 0 ? -EFAULT : 0;
+        return wire_device_put(arg, sizeof(size), &size, sizeof(size)) < 0 ? -EFAULT : 0;
     }
     if (request == HIDIOCGRDESC)
         return put_descriptor(m, arg);
     if (request == HIDIOCGRAWINFO) {
         struct hidraw_devinfo info = {m->bus, (int16_t)m->vendor, (int16_t)m->product};
-        return put(arg, sizeof(info), &info, sizeof(info)) < 0 ? -EFAULT : 0;
+        return wire_device_put(arg, sizeof(info), &info, sizeof(info)) < 0 ? -EFAULT : 0;
     }
     size_t size = _IOC_SIZE(request);
     if (_IOC_TYPE(request) != 'H')
         return -ENOTTY;
     if (_IOC_NR(request) == _IOC_NR(HIDIOCGRAWNAME(0)))
-        return put(arg, size, m->name, strlen(m->name) + 1);
+        return wire_device_put(arg, size, m->name, strlen(m->name) + 1);
     if (_IOC_NR(request) == _IOC_NR(HIDIOCGRAWUNIQ(0)))
-        return put(arg, size, m->unique, strlen(m->unique) + 1);
+        return wire_device_put(arg, size, m->unique, strlen(m->unique) + 1);
     return -EPIPE; // feature reports: this device has none
 }
 
-static gboolean on_ioctl(UMockdevIoctlBase *handler, UMockdevIoctlClient *client, gpointer data)
+static void vanished(void *owner, UMockdevIoctlClient *client)
 {
-    (void)handler;
-    struct hid_device_emulated *d = data;
-    waiter_lock(&d->wire.waiter);
-    int result = answer(d, client);
-    waiter_unlock(&d->wire.waiter);
-    umockdev_ioctl_client_complete(client, result < 0 ? -1 : result, result < 0 ? -result : 0);
-    return TRUE;
-}
-
-static void on_vanished(UMockdevIoctlBase *handler, UMockdevIoctlClient *client, gpointer data)
-{
-    (void)handler;
-    struct hid_device_emulated *d = data;
-    waiter_lock(&d->wire.waiter);
+    struct hid_device_emulated *d = owner;
     if (d->reader == client)
         d->reader = NULL;
-    clients_remove(&d->wire.clients, client);
     while (d->wire.clients.count == 0 && d->queued > 0)
         take(d);
-    waiter_unlock(&d->wire.waiter);
 }
 
 // ---- the radio link ------------------------------------------------------------------
@@ -253,8 +229,9 @@ static void remove_from_sysfs(struct hid_device_emulated *d, const char *path)
     umockdev_testbed_remove_device(d->wire.testbed, sys);
 }
 
-static bool show(struct hid_device_emulated *d, struct error *err)
+static bool show(void *owner, struct error *err)
 {
+    struct hid_device_emulated *d = owner;
     if (!add(d, describe_hid, err) || !add(d, describe_hidraw, err) ||
         !node_link(&d->wire.node, d->wire.testbed, d->wire.devnode, err))
         return false;
@@ -275,17 +252,7 @@ bool hid_plug(struct hid_device_emulated *device, struct error *err)
              m->bus, m->vendor, m->product, d->number);
     snprintf(d->hidraw_path, sizeof(d->hidraw_path), "%s/hidraw/hidraw%d", d->hid_path,
              d->number - 1);
-    if (!wire_device_attach(&d->wire, err))
-        return false;
-    waiter_lock(&d->wire.waiter);
-    d->wire.plugged = true;
-    waiter_wake(&d->wire.waiter);
-    waiter_unlock(&d->wire.waiter);
-    if (show(d, err))
-        return true;
-    d->wire.plugged = false;
-    wire_device_hide(&d->wire);
-    return false;
+    return wire_device_attach(&d->wire, err) && wire_device_come_in(&d->wire, err);
 }
 
 void hid_unplug(struct hid_device_emulated *device)
@@ -307,6 +274,9 @@ void hid_unplug(struct hid_device_emulated *device)
     wire_device_hide(&d->wire);
 }
 
+static const struct wire_device_bus bus = {
+    .noise = 'h', .pump = pump, .answer = answer, .vanished = vanished, .show = show};
+
 struct hid_device_emulated *hid_emulate(UMockdevTestbed *testbed, const struct hid_model *model,
                                         uint64_t seed, struct error *err)
 {
@@ -316,11 +286,9 @@ struct hid_device_emulated *hid_emulate(UMockdevTestbed *testbed, const struct h
         return NULL;
     }
     d->model = *model;
-    bool started = wire_device_start(&d->wire, testbed, seed, 'h', pump, d, err);
-    g_signal_connect(d->wire.handler, "handle-ioctl", G_CALLBACK(on_ioctl), d);
+    bool started = wire_device_start(&d->wire, testbed, seed, &bus, d, err);
     g_signal_connect(d->wire.handler, "handle-read", G_CALLBACK(on_read), d);
     g_signal_connect(d->wire.handler, "handle-write", G_CALLBACK(on_write), d);
-    g_signal_connect(d->wire.handler, "client-vanished", G_CALLBACK(on_vanished), d);
     if (started)
         return d;
     hid_emulation_end(d);
@@ -329,19 +297,12 @@ struct hid_device_emulated *hid_emulate(UMockdevTestbed *testbed, const struct h
 
 void hid_set_fault(struct hid_device_emulated *device, enum wire_fault fault)
 {
-    waiter_lock(&device->wire.waiter);
-    device->wire.fault = fault;
-    if (device->wire.plugged)
-        node_forbid(&device->wire.node, fault == WIRE_FORBIDDEN);
-    waiter_unlock(&device->wire.waiter);
+    wire_device_set_fault(&device->wire, fault);
 }
 
 void hid_with_model(struct hid_device_emulated *device, void (*act)(void *context), void *context)
 {
-    waiter_lock(&device->wire.waiter);
-    act(context);
-    waiter_wake(&device->wire.waiter);
-    waiter_unlock(&device->wire.waiter);
+    wire_device_with(&device->wire, act, context);
 }
 
 void hid_emulation_end(struct hid_device_emulated *device)

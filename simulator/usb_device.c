@@ -138,7 +138,8 @@ static int next_packet(struct usb_device *d, uint8_t endpoint, int64_t now_ns,
     d->full_packets += (size_t)size == packet_size(d);
     if (d->wire.fault == WIRE_PULLED_IN_SPECTRUM && d->full_packets >= FULL_PACKETS_TO_PULL)
         return tear(d);
-    if (d->wire.fault == WIRE_SHORT || d->wire.fault == WIRE_SILENT || d->wire.fault == WIRE_OVERFLOW)
+    if (d->wire.fault == WIRE_SHORT || d->wire.fault == WIRE_SILENT ||
+        d->wire.fault == WIRE_OVERFLOW)
         drain(d, endpoint, now_ns);
     if (d->wire.fault == WIRE_OVERFLOW)
         return -EOVERFLOW;
@@ -184,8 +185,7 @@ static int transfer_control(struct usb_device *d, struct urb *urb)
     enum { FROM_DEVICE = 0x80, GET_DESCRIPTOR = 6 };
     const uint8_t *setup = urb->buffer ? urb->buffer->data : NULL;
     uint8_t descriptor[USB_DESCRIPTOR_MOST];
-    if (!setup || urb->length < SETUP_SIZE || setup[0] != FROM_DEVICE ||
-        setup[1] != GET_DESCRIPTOR)
+    if (!setup || urb->length < SETUP_SIZE || setup[0] != FROM_DEVICE || setup[1] != GET_DESCRIPTOR)
         return -EPIPE;
     size_t size = usb_descriptor(&d->model, setup[3], setup[2], descriptor);
     size_t wanted = (size_t)setup[6] | (size_t)setup[7] << 8;
@@ -249,8 +249,8 @@ static int submit(struct usb_device *d, UMockdevIoctlClient *client, UMockdevIoc
     urb.endpoint = u->endpoint;
     urb.length = u->buffer_length > 0 ? (size_t)u->buffer_length : 0;
     if (urb.length)
-        urb.buffer = umockdev_ioctl_data_resolve(
-            urb.data, offsetof(struct usbdevfs_urb, buffer), urb.length, NULL);
+        urb.buffer = umockdev_ioctl_data_resolve(urb.data, offsetof(struct usbdevfs_urb, buffer),
+                                                 urb.length, NULL);
     urb.received = malloc(urb.length + 1);
     if ((urb.length && !urb.buffer) || !urb.received) {
         drop(&urb);
@@ -297,15 +297,11 @@ static int discard(struct usb_device *d, UMockdevIoctlClient *client, UMockdevIo
 
 static int get_capabilities(UMockdevIoctlData *arg)
 {
-    UMockdevIoctlData *out = umockdev_ioctl_data_resolve(arg, 0, sizeof(guint32), NULL);
-    if (!out)
-        return -EFAULT;
     guint32 capabilities = USBDEVFS_CAP_ZERO_PACKET | USBDEVFS_CAP_BULK_CONTINUATION |
                            USBDEVFS_CAP_NO_PACKET_SIZE_LIM | USBDEVFS_CAP_BULK_SCATTER_GATHER |
                            USBDEVFS_CAP_REAP_AFTER_DISCONNECT;
-    memcpy(out->data, &capabilities, sizeof(capabilities));
-    g_object_unref(out);
-    return 0;
+    int result = wire_device_put(arg, sizeof(capabilities), &capabilities, sizeof(capabilities));
+    return result < 0 ? result : 0;
 }
 
 static int clear_halt(struct usb_device *d, UMockdevIoctlData *arg)
@@ -321,8 +317,9 @@ static int clear_halt(struct usb_device *d, UMockdevIoctlData *arg)
     return 0;
 }
 
-static int answer(struct usb_device *d, UMockdevIoctlClient *client)
+static int answer(void *owner, UMockdevIoctlClient *client)
 {
+    struct usb_device *d = owner;
     UMockdevIoctlData *arg = umockdev_ioctl_client_get_arg(client);
     gulong request = umockdev_ioctl_client_get_request(client);
     if (request == USBDEVFS_REAPURBNDELAY || request == USBDEVFS_REAPURB)
@@ -352,26 +349,11 @@ static int answer(struct usb_device *d, UMockdevIoctlClient *client)
     }
 }
 
-static gboolean on_ioctl(UMockdevIoctlBase *handler, UMockdevIoctlClient *client, gpointer data)
+static void vanished(void *owner, UMockdevIoctlClient *client)
 {
-    (void)handler;
-    struct usb_device *d = data;
-    waiter_lock(&d->wire.waiter);
-    int result = answer(d, client);
-    waiter_unlock(&d->wire.waiter);
-    umockdev_ioctl_client_complete(client, result < 0 ? -1 : 0, result < 0 ? -result : 0);
-    return TRUE;
-}
-
-static void on_vanished(UMockdevIoctlBase *handler, UMockdevIoctlClient *client, gpointer data)
-{
-    (void)handler;
-    struct usb_device *d = data;
-    waiter_lock(&d->wire.waiter);
-    clients_remove(&d->wire.clients, client);
+    struct usb_device *d = owner;
     drop_of(&d->pending, client);
     drop_of(&d->done, client);
-    waiter_unlock(&d->wire.waiter);
 }
 
 // ---- the plug ----------------------------------------------------------------------
@@ -383,8 +365,9 @@ static void tell(struct usb_device *d, const char *action)
     uevent_tell(d->wire.testbed, &uevent, action);
 }
 
-static bool show(struct usb_device *d, struct error *err)
+static bool show(void *owner, struct error *err)
 {
+    struct usb_device *d = owner;
     GString *text = g_string_new(NULL);
     usb_place_describe(&d->place, &d->model, text);
     if (!wire_device_add(&d->wire, text, err) ||
@@ -418,16 +401,9 @@ bool usb_device_plug(struct usb_device *device, struct error *err)
     snprintf(d->wire.devnode, sizeof(d->wire.devnode), "%s", d->place.devnode);
     if (!wire_device_attach(&d->wire, err))
         return false;
-    waiter_lock(&d->wire.waiter);
     node_set_writable(&d->wire.node, false);
     d->halted = 0;
-    d->wire.plugged = true;
-    waiter_unlock(&d->wire.waiter);
-    if (show(d, err))
-        return true;
-    d->wire.plugged = false;
-    wire_device_hide(&d->wire);
-    return false;
+    return wire_device_come_in(&d->wire, err);
 }
 
 static void torn_off(void *owner)
@@ -454,8 +430,7 @@ bool usb_device_move(struct usb_device *device, struct error *err)
     return usb_device_plug(device, err);
 }
 
-bool usb_device_become(struct usb_device *device, const struct usb_model *model,
-                       struct error *err)
+bool usb_device_become(struct usb_device *device, const struct usb_model *model, struct error *err)
 {
     usb_device_unplug(device);
     waiter_lock(&device->wire.waiter);
@@ -463,6 +438,13 @@ bool usb_device_become(struct usb_device *device, const struct usb_model *model,
     waiter_unlock(&device->wire.waiter);
     return usb_device_plug(device, err);
 }
+
+static const struct wire_device_bus bus = {.noise = 'u',
+                                           .pump = pump,
+                                           .answer = answer,
+                                           .vanished = vanished,
+                                           .show = show,
+                                           .torn_off = torn_off};
 
 struct usb_device *usb_device_create(UMockdevTestbed *testbed, pthread_mutex_t *pulling, int port,
                                      const struct usb_model *model, uint64_t seed,
@@ -475,12 +457,9 @@ struct usb_device *usb_device_create(UMockdevTestbed *testbed, pthread_mutex_t *
     }
     d->model = *model;
     d->wire.pulling = pulling;
-    d->wire.torn_off = torn_off;
     d->place.bus = 1;
     d->place.port = port;
-    bool started = wire_device_start(&d->wire, testbed, seed, 'u', pump, d, err);
-    g_signal_connect(d->wire.handler, "handle-ioctl", G_CALLBACK(on_ioctl), d);
-    g_signal_connect(d->wire.handler, "client-vanished", G_CALLBACK(on_vanished), d);
+    bool started = wire_device_start(&d->wire, testbed, seed, &bus, d, err);
     if (started)
         return d;
     usb_device_destroy(d);
@@ -490,21 +469,15 @@ struct usb_device *usb_device_create(UMockdevTestbed *testbed, pthread_mutex_t *
 void usb_device_set_fault(struct usb_device *device, enum wire_fault fault)
 {
     waiter_lock(&device->wire.waiter);
-    device->wire.fault = fault;
     device->stall_armed = fault == WIRE_STALL;
     device->full_packets = 0;
-    if (device->wire.plugged)
-        node_forbid(&device->wire.node, fault == WIRE_FORBIDDEN);
-    waiter_wake(&device->wire.waiter);
     waiter_unlock(&device->wire.waiter);
+    wire_device_set_fault(&device->wire, fault);
 }
 
 void usb_with_model(struct usb_device *device, void (*act)(void *context), void *context)
 {
-    waiter_lock(&device->wire.waiter);
-    act(context);
-    waiter_wake(&device->wire.waiter);
-    waiter_unlock(&device->wire.waiter);
+    wire_device_with(&device->wire, act, context);
 }
 
 void usb_device_destroy(struct usb_device *device)

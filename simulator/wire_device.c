@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "simulator/wire_device.h"
 
+#include <errno.h>
+#include <string.h>
+
 static void pull(struct wire_device *d)
 {
     waiter_unlock(&d->waiter);
@@ -9,7 +12,7 @@ static void pull(struct wire_device *d)
     bool torn = d->torn; // unless somebody was faster
     waiter_unlock(&d->waiter);
     if (torn)
-        d->torn_off(d->owner);
+        d->bus->torn_off(d->owner);
     pthread_mutex_unlock(d->pulling);
     waiter_lock(&d->waiter);
 }
@@ -21,7 +24,7 @@ static void *run(void *argument)
     while (!d->stopping) {
         if (d->torn)
             pull(d);
-        int64_t again_ns = d->plugged ? d->pump(d->owner) : INT64_MAX;
+        int64_t again_ns = d->plugged ? d->bus->pump(d->owner) : INT64_MAX;
         if (!d->torn)
             waiter_wait(&d->waiter, again_ns);
     }
@@ -39,18 +42,41 @@ static void on_connected(UMockdevIoctlBase *handler, UMockdevIoctlClient *client
     waiter_unlock(&d->waiter);
 }
 
+static void on_vanished(UMockdevIoctlBase *handler, UMockdevIoctlClient *client, gpointer data)
+{
+    (void)handler;
+    struct wire_device *d = data;
+    waiter_lock(&d->waiter);
+    clients_remove(&d->clients, client);
+    d->bus->vanished(d->owner, client);
+    waiter_unlock(&d->waiter);
+}
+
+static gboolean on_ioctl(UMockdevIoctlBase *handler, UMockdevIoctlClient *client, gpointer data)
+{
+    (void)handler;
+    struct wire_device *d = data;
+    waiter_lock(&d->waiter);
+    int result = d->bus->answer(d->owner, client);
+    waiter_unlock(&d->waiter);
+    umockdev_ioctl_client_complete(client, result < 0 ? -1 : result, result < 0 ? -result : 0);
+    return TRUE;
+}
+
 bool wire_device_start(struct wire_device *device, UMockdevTestbed *testbed, uint64_t seed,
-                       char kind, wire_device_pump *pump, void *owner, struct error *err)
+                       const struct wire_device_bus *bus, void *owner, struct error *err)
 {
     struct wire_device *d = device;
     d->testbed = testbed;
-    d->pump = pump;
+    d->bus = bus;
     d->owner = owner;
     d->node.master = d->node.slave = -1;
     d->handler = umockdev_ioctl_base_new();
-    noise_init(&d->noise, seed, kind);
+    noise_init(&d->noise, seed, (uint64_t)bus->noise);
     waiter_init(&d->waiter);
     g_signal_connect(d->handler, "client-connected", G_CALLBACK(on_connected), d);
+    g_signal_connect(d->handler, "client-vanished", G_CALLBACK(on_vanished), d);
+    g_signal_connect(d->handler, "handle-ioctl", G_CALLBACK(on_ioctl), d);
     d->running = pthread_create(&d->thread, NULL, run, d) == 0;
     return d->running || fail(err, ERROR_SYSTEM, "starting a thread");
 }
@@ -72,6 +98,53 @@ bool wire_device_attach(struct wire_device *device, struct error *err)
         return true;
     node_close(&d->node);
     return refused(d, problem, err);
+}
+
+static void set_plugged(struct wire_device *d, bool plugged)
+{
+    waiter_lock(&d->waiter);
+    d->plugged = plugged;
+    waiter_wake(&d->waiter);
+    waiter_unlock(&d->waiter);
+}
+
+bool wire_device_come_in(struct wire_device *device, struct error *err)
+{
+    set_plugged(device, true);
+    if (device->bus->show(device->owner, err))
+        return true;
+    set_plugged(device, false);
+    wire_device_hide(device);
+    return false;
+}
+
+int wire_device_put(UMockdevIoctlData *arg, size_t size, const void *bytes, size_t count)
+{
+    UMockdevIoctlData *out = umockdev_ioctl_data_resolve(arg, 0, size, NULL);
+    if (!out)
+        return -EFAULT;
+    count = count < size ? count : size;
+    memcpy(out->data, bytes, count);
+    g_object_unref(out);
+    return (int)count;
+}
+
+void wire_device_set_fault(struct wire_device *device, enum wire_fault fault)
+{
+    waiter_lock(&device->waiter);
+    device->fault = fault;
+    if (device->plugged)
+        node_forbid(&device->node, fault == WIRE_FORBIDDEN);
+    waiter_wake(&device->waiter);
+    waiter_unlock(&device->waiter);
+}
+
+void wire_device_with(struct wire_device *device, void (*act)(void *context), void *context)
+{
+    waiter_lock(&device->waiter);
+    act(context);
+    waiter_wake(&device->waiter);
+    waiter_unlock(&device->waiter);
 }
 
 bool wire_device_add(struct wire_device *device, GString *text, struct error *err)
