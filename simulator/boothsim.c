@@ -238,6 +238,8 @@ static bool plug_in(struct booth *b, struct error *err)
         .seed = (uint64_t)s->world.seed,
         .radiometer_hurry = s->radiometer.hurry,
         .radiometer_lapses = {s->radiometer.drift, s->radiometer.misread_every},
+        .enumeration_s = s->world.enumeration_s,
+        .line_enumeration_s = s->world.line_enumeration_s,
         .collector_mm2 = s->spectrometer.collector_mm2,
         .calibration_error = s->spectrometer.calibration_error,
         .camera_pitch_deg = s->camera.pitch_deg,
@@ -296,6 +298,7 @@ static bool live(struct booth *b, int *status, struct error *err)
         if (!control_serve(b->server, SERVE_MS, on_request, b, err))
             return false;
         world_faults_due(b->world, clock_now_ns(), on_fault, b);
+        wire_enumerate(b->wire, clock_now_ns());
         if (b->options->command ? child_has_ended(&b->command) : told_to_stop)
             break;
         if (b->options->xvfb && child_has_ended(&b->xvfb))

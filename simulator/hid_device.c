@@ -255,6 +255,11 @@ bool hid_plug(struct hid_device_emulated *device, struct error *err)
     return wire_device_attach(&d->wire, err) && wire_device_come_in(&d->wire, err);
 }
 
+bool hid_is_plugged(const struct hid_device_emulated *device)
+{
+    return device->wire.plugged;
+}
+
 void hid_unplug(struct hid_device_emulated *device)
 {
     struct hid_device_emulated *d = device;

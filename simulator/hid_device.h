@@ -20,6 +20,8 @@ struct hid_device_emulated *hid_emulate(UMockdevTestbed *testbed, const struct h
 // Shows up as the next /dev/hidrawN. One thread at a time.
 bool hid_plug(struct hid_device_emulated *device, struct error *err);
 
+bool hid_is_plugged(const struct hid_device_emulated *device);
+
 // Goes away as a lost radio link does. Accepts an unplugged device.
 void hid_unplug(struct hid_device_emulated *device);
 

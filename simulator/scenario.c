@@ -45,6 +45,9 @@ static const struct setting world_rows[] = {
     TEXT(script, "", "File of timed events; empty = none."),
     TEXT(lamp, "", "Lamp at the start; empty = the first, none = dark."),
     DOUBLE(level, 0, 1.2, "", "1", "Its level."),
+    DOUBLE(enumeration_s, 0, 60, "s", "2",
+           "How long a USB device or the camera takes to show once it is plugged in again."),
+    DOUBLE(line_enumeration_s, 0, 60, "s", "0", "How long a serial line takes."),
     {0},
 };
 #undef OWNER

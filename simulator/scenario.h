@@ -19,6 +19,7 @@ struct scenario_world {
     char script[SCENARIO_PATH_SIZE];
     char lamp[SCENARIO_NAME_SIZE]; // at the start; "" = the first, "none" = dark
     double level;
+    double enumeration_s, line_enumeration_s;
 };
 
 struct scenario_screen {

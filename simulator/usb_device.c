@@ -387,16 +387,20 @@ static void withdraw(struct usb_device *d)
     d->shown = false;
 }
 
+bool usb_device_is_plugged(struct usb_device *device)
+{
+    waiter_lock(&device->wire.waiter);
+    bool plugged = device->wire.plugged && !device->wire.torn;
+    waiter_unlock(&device->wire.waiter);
+    return plugged;
+}
+
 bool usb_device_plug(struct usb_device *device, struct error *err)
 {
     struct usb_device *d = device;
-    waiter_lock(&d->wire.waiter);
-    bool torn = d->wire.torn, plugged = d->wire.plugged;
-    waiter_unlock(&d->wire.waiter);
-    if (torn)
-        usb_device_unplug(d);
-    else if (plugged)
+    if (usb_device_is_plugged(d))
         return true;
+    usb_device_unplug(d); // when it is torn and its thread has not seen to it yet
     usb_place_next(&d->place);
     snprintf(d->wire.devnode, sizeof(d->wire.devnode), "%s", d->place.devnode);
     if (!wire_device_attach(&d->wire, err))
@@ -423,20 +427,18 @@ void usb_device_unplug(struct usb_device *device)
         withdraw(d);
 }
 
-bool usb_device_move(struct usb_device *device, struct error *err)
+void usb_device_move(struct usb_device *device)
 {
     usb_device_unplug(device);
     device->place.bus = device->place.bus == 1 ? 2 : 1;
-    return usb_device_plug(device, err);
 }
 
-bool usb_device_become(struct usb_device *device, const struct usb_model *model, struct error *err)
+void usb_device_become(struct usb_device *device, const struct usb_model *model)
 {
     usb_device_unplug(device);
     waiter_lock(&device->wire.waiter);
     device->model = *model;
     waiter_unlock(&device->wire.waiter);
-    return usb_device_plug(device, err);
 }
 
 static const struct wire_device_bus bus = {.noise = 'u',

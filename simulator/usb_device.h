@@ -24,15 +24,16 @@ struct usb_device *usb_device_create(UMockdevTestbed *testbed, pthread_mutex_t *
 // Shows up at its port with another device number than before.
 bool usb_device_plug(struct usb_device *device, struct error *err);
 
+bool usb_device_is_plugged(struct usb_device *device);
+
 // Goes away as a pulled plug does. Accepts an unplugged device.
 void usb_device_unplug(struct usb_device *device);
 
-// Goes from bus 1 to bus 2 or back.
-bool usb_device_move(struct usb_device *device, struct error *err);
+// Goes away, to come back at the other bus, 1 or 2.
+void usb_device_move(struct usb_device *device);
 
-// Comes back as another device, or as itself.
-bool usb_device_become(struct usb_device *device, const struct usb_model *model,
-                       struct error *err);
+// Goes away, to come back as another device, or as itself.
+void usb_device_become(struct usb_device *device, const struct usb_model *model);
 
 // SILENT: data of the device are lost. GARBAGE: random. SHORT: half the first
 // packet, the rest is lost. STALL: the next IN transfer stalls, once, and its

@@ -39,7 +39,9 @@ struct wire {
     struct radiometer_end *radiometer;
     struct line *radiometer_line;
 
-    pthread_mutex_t lock; // plugs and pulls one at a time
+    pthread_mutex_t lock; // plugs and pulls one at a time; guards what follows
+    enum wire_fault fault[WIRE_COUNT];
+    int64_t shows_ns[WIRE_COUNT]; // plugged in and not enumerated yet; 0 = neither
 };
 
 // ---- making ------------------------------------------------------------------------
@@ -165,6 +167,33 @@ static bool plug(struct wire *w, enum wire_instrument instrument, struct error *
     return fail(err, ERROR_RANGE, "no such instrument: %d", (int)instrument);
 }
 
+static bool is_plugged(const struct wire *w, enum wire_instrument instrument)
+{
+    switch (instrument) {
+    case WIRE_SPECTROMETER:
+    case WIRE_SPECTROMETER_2:
+        return usb_device_is_plugged(w->spectrometers[instrument == WIRE_SPECTROMETER_2].usb);
+    case WIRE_INCLINOMETER:
+        return w->inclinometer_tcp ? tcp_is_plugged(w->inclinometer_tcp)
+                                   : line_is_plugged(w->inclinometer_line);
+    case WIRE_CAMERA:
+        return hid_is_plugged(w->camera_hid);
+    case WIRE_RADIOMETER:
+        return line_is_plugged(w->radiometer_line);
+    case WIRE_COUNT:
+        break;
+    }
+    return false;
+}
+
+static double enumeration_s(const struct wire *w, enum wire_instrument instrument)
+{
+    if (1u << instrument & (WIRE_ON_USB | WIRE_ON_HID))
+        return w->options.enumeration_s;
+    return w->inclinometer_tcp && instrument == WIRE_INCLINOMETER ? 0
+                                                                  : w->options.line_enumeration_s;
+}
+
 static void unplug(struct wire *w, enum wire_instrument instrument)
 {
     switch (instrument) {
@@ -219,14 +248,6 @@ static enum ooi_upset upset_of(enum wire_fault fault)
 static void set_usb_fault(struct spectrometer_end *s, enum wire_fault fault)
 {
     struct upset upset = {s->model, upset_of(fault)};
-    bool blank = fault == WIRE_BLANK;
-    if (blank != s->blank && fault != WIRE_UNPLUGGED) {
-        struct usb_model face = blank ? usb_blank_model() : ooi_model(s->model);
-        usb_device_become(s->usb, &face, NULL);
-        s->blank = blank;
-    }
-    if (fault == WIRE_MOVED)
-        usb_device_move(s->usb, NULL);
     usb_device_set_fault(s->usb, fault);
     usb_with_model(s->usb, upset_model, &upset);
 }
@@ -257,17 +278,62 @@ static void set_fault(struct wire *w, enum wire_instrument instrument, enum wire
     }
 }
 
+static void pull_usb(struct spectrometer_end *s, enum wire_fault fault)
+{
+    bool blank = fault == WIRE_BLANK;
+    if (blank != s->blank) {
+        struct usb_model face = blank ? usb_blank_model() : ooi_model(s->model);
+        usb_device_become(s->usb, &face);
+        s->blank = blank;
+    }
+    if (fault == WIRE_MOVED)
+        usb_device_move(s->usb);
+}
+
+static void show(struct wire *w, enum wire_instrument instrument)
+{
+    w->shows_ns[instrument] = 0;
+    plug(w, instrument, NULL);
+    set_fault(w, instrument, w->fault[instrument]);
+}
+
+static void come_back(struct wire *w, enum wire_instrument instrument)
+{
+    double takes_s = enumeration_s(w, instrument);
+    if (is_plugged(w, instrument) || w->shows_ns[instrument])
+        return;
+    if (takes_s > 0)
+        w->shows_ns[instrument] = clock_now_ns() + (int64_t)(takes_s * NS_PER_S);
+    else
+        plug(w, instrument, NULL); // stays pulled when the system has no terminal left
+}
+
 void wire_set_fault(struct wire *wire, enum wire_instrument instrument, enum wire_fault fault)
 {
-    bool there = instrument != WIRE_SPECTROMETER_2 || has_second(&wire->options);
+    struct wire *w = wire;
+    bool there = instrument != WIRE_SPECTROMETER_2 || has_second(&w->options);
     if (!wire_fault_suits(instrument, fault) || !there)
         return;
+    pthread_mutex_lock(&w->lock);
+    w->fault[instrument] = fault;
+    if (fault == WIRE_UNPLUGGED) {
+        w->shows_ns[instrument] = 0;
+        unplug(w, instrument);
+    } else {
+        if (1u << instrument & WIRE_ON_USB)
+            pull_usb(spectrometer(w, instrument), fault);
+        come_back(w, instrument);
+    }
+    set_fault(w, instrument, fault);
+    pthread_mutex_unlock(&w->lock);
+}
+
+void wire_enumerate(struct wire *wire, int64_t now_ns)
+{
     pthread_mutex_lock(&wire->lock);
-    if (fault == WIRE_UNPLUGGED)
-        unplug(wire, instrument);
-    else
-        plug(wire, instrument, NULL); // stays pulled when the system has no terminal left
-    set_fault(wire, instrument, fault);
+    for (int i = 0; i < WIRE_COUNT; i++)
+        if (wire->shows_ns[i] && wire->shows_ns[i] <= now_ns)
+            show(wire, (enum wire_instrument)i);
     pthread_mutex_unlock(&wire->lock);
 }
 
@@ -283,6 +349,8 @@ static bool check(const struct wire_options *o, struct error *err)
                         o->serial[i] ? o->serial[i] : "");
     if (!(o->radiometer_hurry >= 1))
         return fail(err, ERROR_RANGE, "radiometer_hurry: %g is below 1", o->radiometer_hurry);
+    if (!(o->enumeration_s >= 0 && o->line_enumeration_s >= 0))
+        return fail(err, ERROR_RANGE, "enumeration_s: is below 0");
     if (o->radiometer_lapses.misread_every < 1)
         return fail(err, ERROR_RANGE, "misread_every: %d is below 1",
                     o->radiometer_lapses.misread_every);

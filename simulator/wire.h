@@ -95,6 +95,8 @@ struct wire_options {
     uint64_t seed;              // of all noise
     double radiometer_hurry;    // divides the radiometer's exposure times, >= 1
     struct lapse_rates radiometer_lapses; // of the faults drift and misread
+    double enumeration_s;       // from plugging it in again until a USB device or the camera shows
+    double line_enumeration_s;  // the same of a serial line; a TCP port is there at once
     double collector_mm2;       // of the cosine corrector
     double calibration_error;   // relative slope error of spectrometer.cal over 180 nm, 0 = exact
     double camera_pitch_deg;    // of the camera's axis above the horizon, for its own accelerometer
@@ -108,8 +110,13 @@ struct wire *wire_start(const struct wire_options *options, struct error *err);
 // Whether the instrument's wire knows this fault.
 bool wire_fault_suits(enum wire_instrument instrument, enum wire_fault fault);
 
-// One that does not suit is ignored. Any thread.
+// One that does not suit is ignored. What comes back after being away shows
+// when it is enumerated: at once when that takes no time, else by
+// wire_enumerate. Any thread.
 void wire_set_fault(struct wire *wire, enum wire_instrument instrument, enum wire_fault fault);
+
+// Shows what was plugged in long enough ago. To be called now and then. Any thread.
+void wire_enumerate(struct wire *wire, int64_t now_ns);
 
 // Unplugs everything, joins the threads. Accepts NULL.
 void wire_stop(struct wire *wire);

@@ -116,6 +116,11 @@ bool line_plug(struct line *line, struct error *err)
     return false;
 }
 
+bool line_is_plugged(const struct line *line)
+{
+    return line->plugged;
+}
+
 void line_unplug(struct line *line)
 {
     if (!line->plugged)

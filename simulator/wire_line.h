@@ -28,6 +28,8 @@ struct line *line_create(const char *path, const struct line_end *end, struct er
 // Opens a new terminal, points the symlink to it. One thread at a time.
 bool line_plug(struct line *line, struct error *err);
 
+bool line_is_plugged(const struct line *line);
+
 // Removes the symlink and hangs up. Accepts an unplugged line.
 void line_unplug(struct line *line);
 

@@ -186,6 +186,11 @@ bool tcp_plug(struct tcp_end *tcp, struct error *err)
     return t->running || fail(err, ERROR_SYSTEM, "starting a thread");
 }
 
+bool tcp_is_plugged(const struct tcp_end *tcp)
+{
+    return tcp->running;
+}
+
 void tcp_unplug(struct tcp_end *tcp)
 {
     struct tcp_end *t = tcp;

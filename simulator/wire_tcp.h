@@ -17,6 +17,8 @@ struct tcp_end *tcp_create(int port, const char *port_path, const struct line_en
 // Listens at 127.0.0.1. One thread at a time.
 bool tcp_plug(struct tcp_end *tcp, struct error *err);
 
+bool tcp_is_plugged(const struct tcp_end *tcp);
+
 // Closes the port and the connection. Accepts one that does not listen.
 void tcp_unplug(struct tcp_end *tcp);
 

@@ -7,6 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "base/clock.h"
 #include "base/error.h"
 
 #include <cmocka.h> // last: its fail() is a macro
@@ -310,6 +311,103 @@ static void a_fault_of_another_wire_changes_nothing(void **state)
     close_usb(&o);
 }
 
+// ---- enumeration -----------------------------------------------------------------------
+
+#define NEVER_S 1000.0 // the test does not wait for it
+
+static int start_slow(void **state)
+{
+    (void)state;
+    struct wire_options options = usual();
+    options.enumeration_s = options.line_enumeration_s = NEVER_S;
+    return start_with(&options);
+}
+
+static void let_pass(double seconds)
+{
+    wire_enumerate(wire, clock_now_ns() + (int64_t)(seconds * NS_PER_S));
+}
+
+static bool camera_is_there(void)
+{
+    struct hid_device_info *info = hid_enumerate(NINTENDO, REMOTE);
+    hid_free_enumeration(info);
+    return info;
+}
+
+static bool spectrometer_is_there(void)
+{
+    libusb_context *usb;
+    assert_int_equal(libusb_init(&usb), 0);
+    libusb_device_handle *handle = open_spectrometer(usb);
+    libusb_close(handle);
+    libusb_exit(usb);
+    return handle;
+}
+
+static bool radiometer_is_there(void)
+{
+    return access(in_folder("radiometer"), F_OK) == 0;
+}
+
+static void plugged_again_they_show_once_enumerated(void **state)
+{
+    (void)state;
+    const struct {
+        enum wire_instrument instrument;
+        bool (*is_there)(void);
+    } rows[] = {{WIRE_SPECTROMETER, spectrometer_is_there},
+                {WIRE_CAMERA, camera_is_there},
+                {WIRE_RADIOMETER, radiometer_is_there}};
+    for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+        assert_true(rows[i].is_there());
+        set_fault(rows[i].instrument, WIRE_UNPLUGGED);
+        assert_false(rows[i].is_there());
+        set_fault(rows[i].instrument, WIRE_FINE);
+        let_pass(NEVER_S / 2);
+        assert_false(rows[i].is_there());
+        let_pass(NEVER_S + 1);
+        assert_true(rows[i].is_there());
+    }
+}
+
+static void pulled_again_before_it_is_enumerated_it_does_not_show(void **state)
+{
+    (void)state;
+    set_fault(WIRE_CAMERA, WIRE_UNPLUGGED);
+    set_fault(WIRE_CAMERA, WIRE_FINE);
+    set_fault(WIRE_CAMERA, WIRE_UNPLUGGED);
+    let_pass(NEVER_S + 1);
+    assert_false(camera_is_there());
+    set_fault(WIRE_CAMERA, WIRE_FINE);
+    let_pass(NEVER_S + 1);
+    assert_true(camera_is_there());
+}
+
+static void a_fault_set_meanwhile_is_there_when_it_shows(void **state)
+{
+    (void)state;
+    set_fault(WIRE_CAMERA, WIRE_UNPLUGGED);
+    set_fault(WIRE_CAMERA, WIRE_FORBIDDEN);
+    let_pass(NEVER_S + 1);
+    assert_true(camera_is_there());
+    assert_null(hid_open(NINTENDO, REMOTE, NULL));
+    set_fault(WIRE_CAMERA, WIRE_FINE);
+    hid_device *camera = hid_open(NINTENDO, REMOTE, NULL);
+    assert_non_null(camera);
+    hid_close(camera);
+}
+
+static void moving_takes_an_enumeration_too(void **state)
+{
+    (void)state;
+    set_fault(WIRE_SPECTROMETER, WIRE_MOVED);
+    set_fault(WIRE_SPECTROMETER, WIRE_FINE);
+    assert_false(spectrometer_is_there());
+    let_pass(NEVER_S + 1);
+    assert_true(spectrometer_is_there());
+}
+
 int main(int argc, char **argv)
 {
     (void)argc;
@@ -333,5 +431,12 @@ int main(int argc, char **argv)
         cmocka_unit_test(a_wrong_report_has_another_id),
         cmocka_unit_test(a_fault_of_another_wire_changes_nothing),
     };
-    return cmocka_run_group_tests(tests, start, stop);
+    const struct CMUnitTest slow[] = {
+        cmocka_unit_test(plugged_again_they_show_once_enumerated),
+        cmocka_unit_test(pulled_again_before_it_is_enumerated_it_does_not_show),
+        cmocka_unit_test(a_fault_set_meanwhile_is_there_when_it_shows),
+        cmocka_unit_test(moving_takes_an_enumeration_too),
+    };
+    return cmocka_run_group_tests(tests, start, stop) +
+           cmocka_run_group_tests(slow, start_slow, stop);
 }
