@@ -28,6 +28,9 @@ struct around {
     void (*radiance)(void *context, int64_t at_ns, struct spectrum *out);
     // Place of a fourth marker, as markers; false = there is none. May be NULL.
     bool (*fourth_marker)(void *context, int64_t at_ns, struct vec3 *out);
+    // Pose of the head (its frame: see head.h) in the frame of opentrack's
+    // camera, whose axes are those of the markers' camera. May be NULL.
+    struct rigid (*head)(void *context, int64_t at_ns);
 };
 
 #endif

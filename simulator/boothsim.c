@@ -243,6 +243,10 @@ static bool plug_in(struct booth *b, struct error *err)
         .collector_mm2 = s->spectrometer.collector_mm2,
         .calibration_error = s->spectrometer.calibration_error,
         .camera_pitch_deg = s->camera.pitch_deg,
+        .opentrack_port = s->opentrack.port,
+        .opentrack_rate_hz = s->opentrack.rate_hz,
+        .opentrack_zero = {s->opentrack.zero_m[0], s->opentrack.zero_m[1], s->opentrack.zero_m[2]},
+        .opentrack_mirrored = s->opentrack.mirrored,
     };
     b->wire = wire_start(&options, err);
     return b->wire || while_doing(err, "plugging the instruments in");

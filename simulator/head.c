@@ -36,6 +36,13 @@ void clip_markers(const struct scenario_head *head, struct vec3 eye, struct vec3
         out[i] = on_head(head, &turn, eye, models[head->markers][i]);
 }
 
+struct rigid head_pose(const struct scenario_head *head, struct vec3 eye, struct vec3 at)
+{
+    struct mat3 turn = head_turn(head, eye, at);
+    return (struct rigid){.rotation = turn,
+                          .translation = on_head(head, &turn, eye, (struct vec3){0, 0, 0})};
+}
+
 bool head_fourth_marker(const struct scenario_head *head, struct vec3 eye, struct vec3 at,
                         struct vec3 *out)
 {

@@ -23,6 +23,9 @@ struct mat3 head_turn(const struct scenario_head *head, struct vec3 eye, struct 
 void clip_markers(const struct scenario_head *head, struct vec3 eye, struct vec3 at,
                   struct vec3 out[3]);
 
+// booth_from_head: where the origin of clip or cap is and how its frame turns.
+struct rigid head_pose(const struct scenario_head *head, struct vec3 eye, struct vec3 at);
+
 // Place of the fourth marker; false when none is worn.
 bool head_fourth_marker(const struct scenario_head *head, struct vec3 eye, struct vec3 at,
                         struct vec3 *out);

@@ -107,6 +107,19 @@ static const struct setting camera_rows[] = {
     {0},
 };
 #undef OWNER
+#define OWNER scenario_opentrack
+static const struct setting opentrack_rows[] = {
+    INT(port, 0, 65535, "", "0", "UDP port at 127.0.0.1 that opentrack sends to; 0 = none runs."),
+    DOUBLE(rate_hz, 1, 1000, "Hz", "60", "How often it sends."),
+    VECTOR(place_m, 3, -5, 5, "m", "0 0.35 -0.20", "Place of its camera, booth frame."),
+    DOUBLE(pitch_deg, -90, 90, "deg", "10", "How far the camera's axis points above +z."),
+    DOUBLE(yaw_deg, -90, 90, "deg", "0", "How far the camera's axis turns towards +x."),
+    VECTOR(zero_m, 3, -5, 5, "m", "0 0 0",
+           "Where it was centred: to the observer's right, up, away from the camera."),
+    BOOL(mirrored, "yes", "Its picture is mirrored; else x, yaw and roll have the other sign."),
+    {0},
+};
+#undef OWNER
 #define OWNER scenario_panel
 static const struct setting panel_rows[] = {
     DOUBLE(white_cdm2, 1, 10000, "cd/m2", "900", "White at the centre, along the normal, warm."),
@@ -203,7 +216,7 @@ static const struct setting lamp_rows[] = {
 };
 #undef OWNER
 
-enum { SECTIONS = 12, SECTIONS_ALL = SECTIONS + SCENARIO_LAMPS_MOST + 1 };
+enum { SECTIONS = 13, SECTIONS_ALL = SECTIONS + SCENARIO_LAMPS_MOST + 1 };
 
 static const char *const lamp_sections[SCENARIO_LAMPS_MOST] = {"lamp1", "lamp2", "lamp3",
                                                                "lamp4", "lamp5", "lamp6"};
@@ -217,6 +230,7 @@ static void sections_of(struct scenario *s, struct settings_section out[SECTIONS
         {"ceiling", ceiling_rows, &s->ceiling},
         {"head", head_rows, &s->head},
         {"camera", camera_rows, &s->camera},
+        {"opentrack", opentrack_rows, &s->opentrack},
         {"panel", panel_rows, &s->panel},
         {"spectrometer", spectrometer_rows, &s->spectrometer},
         {"spectrometer2", spectrometer_2_rows, &s->spectrometer_2},

@@ -57,6 +57,15 @@ struct scenario_camera {
     double place_m[3], pitch_deg, yaw_deg;
 };
 
+// opentrack, which sends where the head is in datagrams.
+struct scenario_opentrack {
+    int port; // UDP at 127.0.0.1; 0 = it does not run
+    double rate_hz;
+    double place_m[3], pitch_deg, yaw_deg; // of its camera
+    double zero_m[3];
+    bool mirrored; // its picture
+};
+
 struct scenario_panel {
     double white_cdm2, black_cdm2, reflectance;
     int bits;
@@ -122,6 +131,7 @@ struct scenario {
     struct scenario_ceiling ceiling;
     struct scenario_head head;
     struct scenario_camera camera;
+    struct scenario_opentrack opentrack;
     struct scenario_panel panel;
     struct scenario_spectrometer spectrometer;
     struct scenario_radiometer radiometer;

@@ -12,6 +12,7 @@
 #include "simulator/model_wiimote.h"
 #include "simulator/usb_device.h"
 #include "simulator/wire_inclinometer.h"
+#include "simulator/wire_opentrack.h"
 #include "simulator/wire_radiometer.h"
 #include "simulator/wire_tcp.h"
 
@@ -38,6 +39,7 @@ struct wire {
     struct tcp_end *inclinometer_tcp;
     struct radiometer_end *radiometer;
     struct line *radiometer_line;
+    struct opentrack_end *opentrack; // may not run
 
     pthread_mutex_t lock; // plugs and pulls one at a time; guards what follows
     enum wire_fault fault[WIRE_COUNT];
@@ -81,16 +83,26 @@ static bool make_spectrometer(struct wire *w, int which, enum wire_instrument in
     return s->usb && write_calibration(w, which, err);
 }
 
-static bool has_second(const struct wire_options *o)
+static bool is_there(const struct wire_options *o, enum wire_instrument instrument)
 {
-    return o->serial[WIRE_SPECTROMETER_2] && o->serial[WIRE_SPECTROMETER_2][0];
+    const char *second = o->serial[WIRE_SPECTROMETER_2];
+    if (instrument == WIRE_OPENTRACK)
+        return o->opentrack_port > 0;
+    return instrument != WIRE_SPECTROMETER_2 || (second && *second);
 }
 
 static bool make_spectrometers(struct wire *w, struct error *err)
 {
     const struct wire_options *o = &w->options;
     return make_spectrometer(w, 0, WIRE_SPECTROMETER, o->model, err) &&
-           (!has_second(o) || make_spectrometer(w, 1, WIRE_SPECTROMETER_2, o->model_2, err));
+           (!is_there(o, WIRE_SPECTROMETER_2) ||
+            make_spectrometer(w, 1, WIRE_SPECTROMETER_2, o->model_2, err));
+}
+
+static bool make_opentrack(struct wire *w, struct error *err)
+{
+    w->opentrack = opentrack_end_create(&w->options, err);
+    return w->opentrack != NULL;
 }
 
 static bool make_camera(struct wire *w, struct error *err)
@@ -161,6 +173,8 @@ static bool plug(struct wire *w, enum wire_instrument instrument, struct error *
         return hid_plug(w->camera_hid, err);
     case WIRE_RADIOMETER:
         return line_plug(w->radiometer_line, err);
+    case WIRE_OPENTRACK: // a program has no plug
+        return true;
     case WIRE_COUNT:
         break;
     }
@@ -180,6 +194,8 @@ static bool is_plugged(const struct wire *w, enum wire_instrument instrument)
         return hid_is_plugged(w->camera_hid);
     case WIRE_RADIOMETER:
         return line_is_plugged(w->radiometer_line);
+    case WIRE_OPENTRACK:
+        return true;
     case WIRE_COUNT:
         break;
     }
@@ -213,6 +229,8 @@ static void unplug(struct wire *w, enum wire_instrument instrument)
         break;
     case WIRE_RADIOMETER:
         line_unplug(w->radiometer_line);
+        break;
+    case WIRE_OPENTRACK:
         break;
     case WIRE_COUNT:
         break;
@@ -273,6 +291,9 @@ static void set_fault(struct wire *w, enum wire_instrument instrument, enum wire
     case WIRE_RADIOMETER:
         line_set_fault(w->radiometer_line, fault);
         break;
+    case WIRE_OPENTRACK:
+        opentrack_end_set_fault(w->opentrack, fault);
+        break;
     case WIRE_COUNT:
         break;
     }
@@ -311,8 +332,7 @@ static void come_back(struct wire *w, enum wire_instrument instrument)
 void wire_set_fault(struct wire *wire, enum wire_instrument instrument, enum wire_fault fault)
 {
     struct wire *w = wire;
-    bool there = instrument != WIRE_SPECTROMETER_2 || has_second(&w->options);
-    if (!wire_fault_suits(instrument, fault) || !there)
+    if (!wire_fault_suits(instrument, fault) || !is_there(&w->options, instrument))
         return;
     pthread_mutex_lock(&w->lock);
     w->fault[instrument] = fault;
@@ -342,8 +362,8 @@ void wire_enumerate(struct wire *wire, int64_t now_ns)
 static bool check(const struct wire_options *o, struct error *err)
 {
     for (int i = 0; i < WIRE_COUNT; i++)
-        if (i == WIRE_SPECTROMETER_2 && !has_second(o))
-            continue;
+        if (i == WIRE_OPENTRACK || !is_there(o, (enum wire_instrument)i))
+            continue; // has no serial number
         else if (!o->serial[i] || strncmp(o->serial[i], "EMU", 3) != 0)
             return fail(err, ERROR_CONFIG, "serial \"%s\": an emulated one begins with EMU",
                         o->serial[i] ? o->serial[i] : "");
@@ -356,6 +376,8 @@ static bool check(const struct wire_options *o, struct error *err)
                     o->radiometer_lapses.misread_every);
     if (!(o->collector_mm2 > 0))
         return fail(err, ERROR_RANGE, "collector_mm2: %g is not above 0", o->collector_mm2);
+    if (is_there(o, WIRE_OPENTRACK) && !(o->opentrack_rate_hz > 0 && o->around.head))
+        return fail(err, ERROR_RANGE, "opentrack: needs a rate and a head");
     return true;
 }
 
@@ -369,10 +391,10 @@ static bool start(struct wire *w, struct error *err)
     bool good = true;
     pthread_mutex_lock(&w->lock);
     for (int i = 0; good && i < WIRE_COUNT; i++)
-        if (i != WIRE_SPECTROMETER_2 || has_second(&w->options))
+        if (is_there(&w->options, (enum wire_instrument)i))
             good = plug(w, (enum wire_instrument)i, err);
     pthread_mutex_unlock(&w->lock);
-    return good;
+    return good && (!is_there(&w->options, WIRE_OPENTRACK) || make_opentrack(w, err));
 }
 
 struct wire *wire_start(const struct wire_options *options, struct error *err)
@@ -397,6 +419,7 @@ void wire_stop(struct wire *wire)
 {
     if (!wire)
         return;
+    opentrack_end_destroy(wire->opentrack);
     for (int i = 0; i < SPECTROMETERS; i++)
         usb_device_destroy(wire->spectrometers[i].usb);
     hid_emulation_end(wire->camera_hid);

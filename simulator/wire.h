@@ -2,7 +2,7 @@
 // The emulated instruments on their wires: spectrometer of the USB2000+'s
 // family, perhaps two (USB), Wii remote infrared camera (HID), WitMotion
 // inclinometer (Modbus RTU on a pty, or TCP), PR-655 spectroradiometer (serial
-// line on a pty). USB and HID are answered
+// line on a pty), perhaps opentrack (UDP). USB and HID are answered
 // below unmodified libusb and hidapi through umockdev; the process must run
 // under umockdev-wrapper.
 #ifndef SIMULATOR_WIRE_H
@@ -21,7 +21,8 @@
     X(INCLINOMETER, "inclinometer")                                                                \
     X(CAMERA, "camera")                                                                            \
     X(RADIOMETER, "radiometer")                                                                    \
-    X(SPECTROMETER_2, "spectrometer2")
+    X(SPECTROMETER_2, "spectrometer2")                                                             \
+    X(OPENTRACK, "opentrack")
 
 enum wire_instrument {
 #define X(name, text) WIRE_##name,
@@ -36,7 +37,9 @@ enum {
     WIRE_ON_MODBUS = 1 << WIRE_INCLINOMETER,
     WIRE_ON_HID = 1 << WIRE_CAMERA,
     WIRE_ON_SERIAL = 1 << WIRE_RADIOMETER,
-    WIRE_ON_ALL = WIRE_ON_USB | WIRE_ON_MODBUS | WIRE_ON_HID | WIRE_ON_SERIAL,
+    WIRE_ON_UDP = 1 << WIRE_OPENTRACK,
+    WIRE_ON_DEVICES = WIRE_ON_USB | WIRE_ON_MODBUS | WIRE_ON_HID | WIRE_ON_SERIAL,
+    WIRE_ON_ALL = WIRE_ON_DEVICES | WIRE_ON_UDP,
 };
 
 // What can go wrong on a wire; each lasts until WIRE_FINE. See wires.md for
@@ -47,7 +50,7 @@ enum {
     X(SILENT, "silent", WIRE_ON_ALL)   /* replies are dropped */                                   \
     X(GARBAGE, "garbage", WIRE_ON_ALL) /* bytes are random: no sync, bad CRC, bad status */        \
     X(SHORT, "short", WIRE_ON_ALL)     /* replies are cut */                                       \
-    X(STALL, "stall", WIRE_ON_ALL)     /* USB stall once, Modbus exception, PR error status */     \
+    X(STALL, "stall", WIRE_ON_DEVICES) /* USB stall once, Modbus exception, PR error status */     \
     X(NO_SYNC, "no-sync", WIRE_ON_USB)         /* spectra end before the sync byte */              \
     X(BAD_SYNC, "bad-sync", WIRE_ON_USB)       /* spectra end with another byte */                 \
     X(OUT_OF_STEP, "out-of-step", WIRE_ON_USB) /* a stale sync byte comes before each spectrum */  \
@@ -59,7 +62,7 @@ enum {
     X(MOVED, "moved", WIRE_ON_USB) /* at once: pulled and plugged again at the other bus */        \
     X(BLANK, "blank", WIRE_ON_USB) /* comes back without its firmware, as 04B4:8613 */             \
     X(FORBIDDEN, "forbidden", WIRE_ON_USB | WIRE_ON_HID)     /* opening it fails with EACCES */    \
-    X(FLOOD, "flood", WIRE_ON_HID)               /* fifty reports where there was one */           \
+    X(FLOOD, "flood", WIRE_ON_HID | WIRE_ON_UDP) /* fifty reports where there was one */           \
     X(WRONG_REPORT, "wrong-report", WIRE_ON_HID) /* reports of another kind */                     \
     X(BAD_CRC, "bad-crc", WIRE_ON_MODBUS)                                                          \
     X(WRONG_UNIT, "wrong-unit", WIRE_ON_MODBUS)  /* another device answers */                      \
@@ -73,7 +76,11 @@ enum {
     X(WEAK_LIGHT, "weak-light", WIRE_ON_SERIAL)  /* every M ends with -8 */                        \
     X(OVERLOAD, "overload", WIRE_ON_SERIAL)      /* every M ends with -2 */                        \
     X(DRIFT, "drift", WIRE_ON_SERIAL)            /* readings creep upwards */                      \
-    X(MISREAD, "misread", WIRE_ON_SERIAL)        /* a reading now and then is false */
+    X(MISREAD, "misread", WIRE_ON_SERIAL)        /* a reading now and then is false */             \
+    X(NOT_A_NUMBER, "not-a-number", WIRE_ON_UDP) /* a value is NaN or infinite */                  \
+    X(FROZEN, "frozen", WIRE_ON_UDP)             /* the last datagram again and again */           \
+    X(WRONG_SIZE, "wrong-size", WIRE_ON_UDP)                                                       \
+    X(OUT_OF_RANGE, "out-of-range", WIRE_ON_UDP) /* a value is impossible */
 
 enum wire_fault {
 #define X(name, text, wires) WIRE_##name,
@@ -100,6 +107,10 @@ struct wire_options {
     double collector_mm2;       // of the cosine corrector
     double calibration_error;   // relative slope error of spectrometer.cal over 180 nm, 0 = exact
     double camera_pitch_deg;    // of the camera's axis above the horizon, for its own accelerometer
+    int opentrack_port;         // UDP at 127.0.0.1; 0 = no opentrack
+    double opentrack_rate_hz;
+    struct vec3 opentrack_zero; // where it was centred, in its camera's frame
+    bool opentrack_mirrored;    // see model_opentrack.h
 };
 
 struct wire;

@@ -14,7 +14,7 @@ struct world {
     struct lamp lamps[SCENARIO_LAMPS_MOST];
     double collector_lux[SCENARIO_LAMPS_MOST]; // at level 1, warm
     struct panel panel;
-    struct rigid camera_from_booth;
+    struct rigid camera_from_booth, tracker_from_booth;
     int64_t start_ns;
     world_pixels *pixels;
     void *pixels_context;
@@ -50,6 +50,14 @@ static bool add_start(struct world *w, struct error *err)
     return event_lamp(s, lamp, s->world.level, false, &event, err) && world_add(w, &event, err);
 }
 
+static struct rigid tracker_pose(const struct scenario_opentrack *o)
+{
+    struct scenario_camera camera = {{o->place_m[0], o->place_m[1], o->place_m[2]},
+                                     o->pitch_deg,
+                                     o->yaw_deg};
+    return camera_pose(&camera);
+}
+
 struct world *world_create(const struct scenario *scenario, int64_t start_ns, struct error *err)
 {
     if (!scenario_check(scenario, err))
@@ -64,6 +72,7 @@ struct world *world_create(const struct scenario *scenario, int64_t start_ns, st
     w->start_ns = start_ns;
     w->faults_until_s = -1;
     w->camera_from_booth = camera_pose(&scenario->camera);
+    w->tracker_from_booth = tracker_pose(&scenario->opentrack);
     panel_init(&w->panel, &scenario->panel, scenario->world.seed);
     if (!make_lamps(w, err) || !add_start(w, err)) {
         world_destroy(w);
@@ -282,6 +291,14 @@ static void sense_markers(void *context, int64_t at_ns, struct vec3 out[3])
         out[i] = rigid_apply(w->camera_from_booth, out[i]);
 }
 
+static struct rigid sense_head(void *context, int64_t at_ns)
+{
+    struct world *w = context;
+    struct world_state s = state_at(w, world_seconds(w, at_ns));
+    struct easel easel = easel_at(&w->scenario.stand, s.tilt_deg);
+    return rigid_mul(w->tracker_from_booth, head_pose(&w->scenario.head, s.eye, easel.centre));
+}
+
 static bool sense_fourth_marker(void *context, int64_t at_ns, struct vec3 *out)
 {
     struct world *w = context;
@@ -407,7 +424,8 @@ struct around world_around(struct world *world)
                            .gravity = sense_gravity,
                            .markers = sense_markers,
                            .radiance = sense_radiance,
-                           .fourth_marker = sense_fourth_marker};
+                           .fourth_marker = sense_fourth_marker,
+                           .head = sense_head};
 }
 
 const struct scenario *world_scenario(const struct world *world)
