@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "calibration/raw_counts.h"
 
 static const int TIMEOUT_MS = 60000;
 
@@ -33,6 +34,7 @@ void bench_close(struct bench *b)
     control_close(b->daemon);
     control_close(b->booth);
     json_decref(b->readings);
+    json_decref(b->lit);
     *b = (struct bench){0};
 }
 
@@ -152,6 +154,24 @@ bool bench_teach(struct bench *b, const char *lamp, int readings, struct taught 
     return true;
 }
 
+// Readings with those that do not count, and a unit that is slow to obey.
+static double raw_timeout_s(int integration_us, int readings)
+{
+    return 20 + (readings + 8) * (integration_us * 1e-6 + 0.05);
+}
+
+bool bench_raw(struct bench *b, int integration_us, int readings, struct raw_counts *out,
+               struct error *err)
+{
+    double timeout_s = raw_timeout_s(integration_us, readings);
+    json_t *request = json_pack("{ss,si,si,sf}", "do", CONTROL_RAW, "integration_us", integration_us,
+                                "readings", readings, "timeout_s", timeout_s);
+    json_t *reply = control_call(b->daemon, request, (int)(1000 * timeout_s) + TIMEOUT_MS, err);
+    bool fine = reply && raw_counts_of(reply, out, err);
+    json_decref(reply);
+    return fine || while_doing(err, "raw counts of %d us", integration_us);
+}
+
 static bool lamp_is(const json_t *status, const char *lamp)
 {
     const json_t *belief = json_object_get(status, "lamp");
@@ -200,6 +220,56 @@ bool bench_lamp(struct bench *b, const char *lamp, struct error *err)
     char please[128];
     snprintf(please, sizeof please, "Switch the booth's lamp to: %s", lamp);
     return by_hand(b, json_pack("{ss,ss}", "do", CONTROL_LAMP, "name", lamp), err, please);
+}
+
+// All lamps off, remembering which were on.
+static bool darken(struct bench *b, struct error *err)
+{
+    json_t *now = control_call(b->booth, json_pack("{ss}", "do", CONTROL_TRUTH), TIMEOUT_MS, err);
+    if (!now)
+        return false;
+    json_decref(b->lit);
+    b->lit = json_incref(json_object_get(now, "levels"));
+    json_decref(now);
+    return bench_lamp(b, "none", err);
+}
+
+static bool relight(struct bench *b, struct error *err)
+{
+    const char *name;
+    json_t *level;
+    bool fine = true;
+    json_object_foreach(b->lit, name, level)
+    {
+        double on = json_number_value(level);
+        fine = fine && (!(on > 0) || done(control_call(b->booth,
+                                                       json_pack("{ss,ss,sf,sb}", "do", CONTROL_LAMP,
+                                                                 "name", name, "level", on, "add", 1),
+                                                       TIMEOUT_MS, err)));
+    }
+    json_decref(b->lit);
+    b->lit = NULL;
+    return fine;
+}
+
+bool bench_lid(struct bench *b, bool closed, struct error *err)
+{
+    if (b->booth)
+        return closed ? darken(b, err) : relight(b, err);
+    if (closed)
+        return by_hand(b, NULL, err, "Close the lid of the spectrometer's diffuser, against all light");
+    fprintf(stderr, "Open the lid of the spectrometer's diffuser again.\n");
+    return true;
+}
+
+bool bench_light(struct bench *b, const char *lamp, const char *what, struct error *err)
+{
+    char please[160];
+    snprintf(please, sizeof please, "Shine %s into the spectrometer", what);
+    if (b->booth && !lamp)
+        return true;
+    return by_hand(b, b->booth ? json_pack("{ss,ss}", "do", CONTROL_LAMP, "name", lamp) : NULL, err,
+                   please);
 }
 
 bool bench_tilt(struct bench *b, double deg, struct error *err)

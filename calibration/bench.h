@@ -10,6 +10,8 @@
 #include "colorimetry/display.h"
 #include "config/booth.h"
 
+struct raw_counts;
+
 struct bench {
     struct control_client *daemon;
     struct control_client *booth; // NULL: a person turns the knobs
@@ -18,6 +20,7 @@ struct bench {
     const char *step;             // of bench_progress, with its start: time and how far
     int64_t step_ns;
     int step_at;
+    json_t *lit;                  // lamps that bench_lid switched off, or NULL
 };
 
 // Connects to the boothd that runs with these settings, and to the emulated
@@ -69,9 +72,22 @@ bool bench_teach(struct bench *b, const char *lamp, int readings, struct taught 
 // Waits until the daemon is sure of lamp ("" = dark), at most timeout_s.
 bool bench_await_lamp(struct bench *b, const char *lamp, double timeout_s, struct error *err);
 
+// Raw counts of the spectrometer: so many readings of one exposure, 0 us: the
+// one it has come to.
+bool bench_raw(struct bench *b, int integration_us, int readings, struct raw_counts *out,
+               struct error *err);
+
 // ---- the booth -------------------------------------------------------------
 
 bool bench_lamp(struct bench *b, const char *lamp, struct error *err); // "none" = off
+
+// Keeps all light from the spectrometer, and lets it in again. Opening waits
+// for nobody.
+bool bench_lid(struct bench *b, bool closed, struct error *err);
+
+// Lights the spectrometer with a lamp for calibrating it. what is how a person
+// is asked for it; lamp is its name in an emulated booth.
+bool bench_light(struct bench *b, const char *lamp, const char *what, struct error *err);
 bool bench_tilt(struct bench *b, double deg, struct error *err);
 bool bench_head(struct bench *b, struct vec3 eye, struct error *err);
 bool bench_aim_screen(struct bench *b, double x_px, double y_px, struct error *err);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// boothcal: colours, a display's model, bands, and a session from bare settings to its report.
+// boothcal: colours, a display's model, bands, and a session from bare settings to its report, the spectrometer.
 #include <stdio.h>
 #include <string.h>
 
@@ -13,6 +13,8 @@ static const struct command FAMILIES[] = {
     {"light", command_light, "points", "the lamps of the booth and their luminance maps"},
     {"session", command_session, "--config FILE --maps FOLDER -o FOLDER",
      "from bare settings to an accuracy report"},
+    {"spectrometer", command_spectrometer, "dark|wavelength|linearity|raw",
+     "calibrating the spectrometer itself: stored darks, wavelengths, linearity"},
     {"list", command_list, "[--config FILE] [--json] | --udev",
      "instruments found, their serial numbers and permissions; the udev rules"},
     {NULL, NULL, NULL, NULL},

@@ -44,5 +44,6 @@ int command_bands(int argc, char **argv);
 int command_light(int argc, char **argv);
 int command_session(int argc, char **argv);
 int command_list(int argc, char **argv);
+int command_spectrometer(int argc, char **argv);
 
 #endif

@@ -22,16 +22,24 @@ static double period(const struct exposure_limits *limits)
     return half;
 }
 
+static double within(double us, const struct exposure_limits *limits)
+{
+    return fmin(fmax(us, limits->least_us), limits->longest_us);
+}
+
+int exposure_hold(double us, const struct exposure_limits *limits)
+{
+    us = within(us, limits);
+    double step = fmax(us > COARSE_FROM_US ? COARSE_US : FINE_US, limits->base_us);
+    us = rint(us / step) * step;
+    return (int)(us < limits->least_us ? us + step : us);
+}
+
 int exposure_round(double us, const struct exposure_limits *limits)
 {
     const double whole = period(limits);
-    us = fmin(fmax(us, limits->least_us), limits->longest_us);
-    double step = us > COARSE_FROM_US ? COARSE_US : FINE_US;
-    step = fmax(step, limits->base_us);
-    if (us >= whole)
-        us = whole * floor(us / whole + 1e-6);
-    us = rint(us / step) * step;
-    return (int)(us < limits->least_us ? us + step : us);
+    us = within(us, limits);
+    return exposure_hold(us >= whole ? whole * floor(us / whole + 1e-6) : us, limits);
 }
 
 // What saturated would not any more, or the signal is not that of the rest.

@@ -29,7 +29,10 @@ struct exposure_seen {
 };
 
 // us as the instrument can hold it: within the limits, steps of 10 us, above
-// 655 ms of 1 ms, whole base_us, multiples of half a mains period from one on.
+// 655 ms of 1 ms, whole base_us.
+int exposure_hold(double us, const struct exposure_limits *limits);
+
+// The same, and from half a mains period on a multiple of it.
 int exposure_round(double us, const struct exposure_limits *limits);
 
 // The next exposure; seen->us itself when that is as good as it gets:

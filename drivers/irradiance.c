@@ -204,12 +204,12 @@ static double bent(const struct ocean_unit *unit, double counts)
     return counts / ocean_bend(unit, counts);
 }
 
-// Scaled counts above dark, linear; *slope is its derivative by the counts read.
-static double linear_counts(const struct ocean_unit *unit, enum bend bend, double light,
-                            double dark, double *slope)
+double ocean_linear_counts(const struct ocean_unit *unit, enum bend bend, double light, double dark,
+                           double *slope)
 {
     const double scale = unit->model->full_counts / unit->saturation;
-    double counts = (light - dark) * scale;
+    double counts = (light - dark) * scale, none;
+    slope = slope ? slope : &none;
     *slope = 1;
     if (bend == BEND_OFF || unit->order < 0)
         return counts;
@@ -240,7 +240,7 @@ static void process_pixels(const struct ocean_unit *unit, const struct ocean_axi
     double counts[OCEAN_PIXELS_MOST], slope[OCEAN_PIXELS_MOST];
     for (int i = 0; i < m->pixels; i++) {
         double dark = process->dark ? process->dark->raw[i] + black - process->dark->black : black;
-        counts[i] = linear_counts(unit, process->bend, reading->raw[i] / n, dark, &slope[i]);
+        counts[i] = ocean_linear_counts(unit, process->bend, reading->raw[i] / n, dark, &slope[i]);
     }
     double haze = stray(unit, counts);
     for (int i = 0; i < m->pixels; i++) {

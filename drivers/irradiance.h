@@ -67,6 +67,11 @@ struct ocean_process {
     const struct ocean_dark *dark; // of the reading's exposure, or NULL: black pixels only
 };
 
+// One pixel's counts above dark on the scale of full_counts, made linear; *slope
+// (may be NULL) is its derivative by the scaled counts read.
+double ocean_linear_counts(const struct ocean_unit *unit, enum bend bend, double light, double dark,
+                           double *slope);
+
 // Standard uncertainties by cause, W m-2 nm-1.
 struct ocean_sigma {
     struct spectrum shot, read, dark, calibration;

@@ -416,7 +416,7 @@ static bool ocean_counts(struct spectrometer *s, int integration_us, int64_t dea
     err = err ? err : &own;
     const struct exposure_limits limits = limits_of(s, s->unit.model->most_us);
     int read_us = s->lent_us ? s->lent_us : s->integration_us;
-    int us = integration_us ? exposure_round(integration_us, &limits) : read_us;
+    int us = integration_us ? exposure_hold(integration_us, &limits) : read_us;
     uint16_t raw[OCEAN_PIXELS_MOST];
     struct interval taken;
     s->lent_us = read_us;

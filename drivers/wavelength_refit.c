@@ -3,10 +3,12 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum {
     PEAKS_MOST = 256,
     HALF_WIDTH = 3,
+    HALF_WIDTH_MOST = 12,
     NEIGHBOURS = 12,
     SHIFT_STEPS = 50,
     ORDER = 4,
@@ -14,7 +16,7 @@ enum {
 };
 
 static const double shift_most_nm = 5, window_nm = 1, other_shift_nm = 2;
-static const double least_part = 0.01, noise_times = 10;
+static const double least_part = 0.01, noise_times = 10, most_wide = 1.4;
 static const double least_span_nm = 200, most_left_nm = 0.5, least_left_nm = 0.03;
 static const double visible_nm[2] = {400, 700};
 
@@ -55,25 +57,122 @@ static bool is_peak(const double *counts, int pixels, int i)
     return counts[i] - foot > noise_times * noise_about(counts, pixels, i);
 }
 
-// Vertex of the parabola through the logarithms: exact for a Gaussian line.
-static double vertex(const double *counts, int i)
+static bool solve(double m[ORDER][ORDER + 1], double out[ORDER])
 {
-    double a = log(fmax(counts[i - 1], 1e-9)), b = log(counts[i]);
-    double c = log(fmax(counts[i + 1], 1e-9)), bend = a - 2 * b + c;
-    double off = bend < 0 ? (a - c) / (2 * bend) : 0;
-    return i + fmin(fmax(off, -0.5), 0.5);
+    for (int i = 0; i < ORDER; i++) {
+        int pivot = i;
+        for (int r = i + 1; r < ORDER; r++)
+            if (fabs(m[r][i]) > fabs(m[pivot][i]))
+                pivot = r;
+        if (fabs(m[pivot][i]) < 1e-12)
+            return false;
+        for (int c = 0; c <= ORDER; c++) {
+            double swap = m[i][c];
+            m[i][c] = m[pivot][c];
+            m[pivot][c] = swap;
+        }
+        for (int r = 0; r < ORDER; r++)
+            for (int c = ORDER; r != i && c >= i; c--)
+                m[r][c] -= m[r][i] / m[i][i] * m[i][c];
+    }
+    for (int i = 0; i < ORDER; i++)
+        out[i] = m[i][ORDER] / m[i][i];
+    return true;
+}
+
+static void add_normal(double normal[ORDER][ORDER + 1], const double power[ORDER], double value)
+{
+    for (int i = 0; i < ORDER; i++) {
+        for (int j = 0; j < ORDER; j++)
+            normal[i][j] += power[i] * power[j];
+        normal[i][ORDER] += power[i] * value;
+    }
+}
+
+// Vertex of the parabola through the logarithms of what stands above half of the
+// peak, weighted by the counts' squares: exact for a Gaussian line (Guo 2011).
+static double vertex(const double *counts, int pixels, int peak)
+{
+    double m[ORDER][ORDER + 1] = {0}, c[ORDER];
+    const double half = counts[peak] / 2;
+    int from = peak - 1, to = peak + 1;
+    while (from > 0 && peak - from < HALF_WIDTH_MOST && counts[from - 1] > half)
+        from--;
+    while (to < pixels - 1 && to - peak < HALF_WIDTH_MOST && counts[to + 1] > half)
+        to++;
+    for (int i = from; i <= to; i++) {
+        double y = fmax(counts[i], 1e-9), x = i - peak, power[ORDER] = {y, y * x, y * x * x, 0};
+        add_normal(m, power, y * log(y / counts[peak]));
+    }
+    m[ORDER - 1][ORDER - 1] = 1;
+    double off = solve(m, c) && c[2] < 0 ? -c[1] / (2 * c[2]) : 0;
+    return peak + fmin(fmax(off, -1), 1);
+}
+
+static double least_between(const double *counts, int from, int to)
+{
+    double least = counts[from];
+    for (int i = from; i <= to; i++)
+        least = fmin(least, counts[i]);
+    return least;
+}
+
+// Two lines that run into each other push each other's peaks aside.
+static bool stands_alone(const double *counts, const int *at, int count, int which)
+{
+    const double half = counts[at[which]] / 2;
+    return (which == 0 || least_between(counts, at[which - 1], at[which]) < half) &&
+           (which == count - 1 || least_between(counts, at[which], at[which + 1]) < half);
+}
+
+// Where the counts cross half of the peak, from it towards step.
+static double crossing(const double *counts, int pixels, int peak, int step)
+{
+    const double half = counts[peak] / 2;
+    int i = peak;
+    while (i + step >= 0 && i + step < pixels && counts[i + step] > half)
+        i += step;
+    int beyond = i + step;
+    if (beyond < 0 || beyond >= pixels)
+        return i;
+    return i + step * (counts[i] - half) / (counts[i] - counts[beyond]);
+}
+
+static int ascending(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+// A lamp's lines are all as wide as the slit makes them: what is wider is more than one.
+static int drop_wide(double *peaks, const double *widths, int count)
+{
+    double sorted[PEAKS_MOST];
+    int kept = 0;
+    memcpy(sorted, widths, sizeof *widths * (size_t)count);
+    qsort(sorted, (size_t)count, sizeof *sorted, ascending);
+    for (int i = 0; i < count; i++)
+        if (widths[i] <= most_wide * sorted[count / 2])
+            peaks[kept++] = peaks[i];
+    return kept;
 }
 
 static int find_peaks(const double *counts, int pixels, double peaks[PEAKS_MOST])
 {
-    double most = 0;
-    int count = 0;
+    double most = 0, widths[PEAKS_MOST];
+    int at[PEAKS_MOST], count = 0, alone = 0;
     for (int i = 0; i < pixels; i++)
         most = fmax(most, counts[i]);
     for (int i = HALF_WIDTH; i < pixels - HALF_WIDTH && count < PEAKS_MOST; i++)
         if (counts[i] > least_part * most && is_peak(counts, pixels, i))
-            peaks[count++] = vertex(counts, i);
-    return count;
+            at[count++] = i;
+    for (int i = 0; i < count; i++) {
+        if (!stands_alone(counts, at, count, i))
+            continue;
+        widths[alone] = crossing(counts, pixels, at[i], 1) - crossing(counts, pixels, at[i], -1);
+        peaks[alone++] = vertex(counts, pixels, at[i]);
+    }
+    return drop_wide(peaks, widths, alone);
 }
 
 struct matches {
@@ -132,44 +231,12 @@ static bool best_shift(const double old[ORDER], const double *peaks, int peak_co
                 best->count);
 }
 
-static bool solve(double m[ORDER][ORDER + 1], double out[ORDER])
-{
-    for (int i = 0; i < ORDER; i++) {
-        int pivot = i;
-        for (int r = i + 1; r < ORDER; r++)
-            if (fabs(m[r][i]) > fabs(m[pivot][i]))
-                pivot = r;
-        if (fabs(m[pivot][i]) < 1e-12)
-            return false;
-        for (int c = 0; c <= ORDER; c++) {
-            double swap = m[i][c];
-            m[i][c] = m[pivot][c];
-            m[pivot][c] = swap;
-        }
-        for (int r = 0; r < ORDER; r++)
-            for (int c = ORDER; r != i && c >= i; c--)
-                m[r][c] -= m[r][i] / m[i][i] * m[i][c];
-    }
-    for (int i = 0; i < ORDER; i++)
-        out[i] = m[i][ORDER] / m[i][i];
-    return true;
-}
-
 // On -1..1, where powers stay apart.
 static void powers(double pixel, int pixels, double out[ORDER])
 {
     double x = 2 * pixel / pixels - 1;
     for (int i = 0; i < ORDER; i++)
         out[i] = i ? out[i - 1] * x : 1;
-}
-
-static void add_normal(double normal[ORDER][ORDER + 1], const double power[ORDER], double value)
-{
-    for (int i = 0; i < ORDER; i++) {
-        for (int j = 0; j < ORDER; j++)
-            normal[i][j] += power[i] * power[j];
-        normal[i][ORDER] += power[i] * value;
-    }
 }
 
 // As a correction of the old axis.

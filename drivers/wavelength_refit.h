@@ -8,8 +8,8 @@
 
 enum { REFIT_LINES_LEAST = 6, REFIT_LINES_MOST = 64 };
 
-// Lines of Hg and Ar in air, nm, ascending, 0 at the end; such that stand alone
-// at 1.5 nm resolution. Source: NIST Atomic Spectra Database.
+// Lines of Hg and Ar in air, nm, ascending, 0 at the end; such that mostly
+// stand alone at 1.5 nm resolution. Source: NIST Atomic Spectra Database.
 extern const double refit_mercury_argon[];
 
 struct refit_line {
@@ -30,10 +30,12 @@ struct refit {
 
 // counts: one spectrum above dark, not saturated, not smoothed by a boxcar.
 // old: the coefficients so far, at most 5 nm off. A peak is a maximum above 1 %
-// of the highest and above ten times the noise of its neighbourhood; a line is used when exactly
-// one peak lies within 1 nm of it after the best common shift. Refused (DATA, saying why): fewer
-// than REFIT_LINES_LEAST lines, lines over less than 200 nm, two shifts that match equally many
-// lines, a line left more than 0.5 nm off, coefficients that do not ascend, lines that leave
+// of the highest and above ten times the noise of its neighbourhood, from which the counts fall
+// below half on both sides before the next one, and that is at most 1.4 times as wide as their
+// median; a line is used when exactly
+// one such peak lies within 1 nm of it after the best common shift. Refused (DATA, saying why):
+// fewer than REFIT_LINES_LEAST lines, lines over less than 200 nm, two shifts that match equally
+// many lines, a line left more than 0.5 nm off, coefficients that do not ascend, lines that leave
 // an axis within 400..700 nm more than 0.5 nm uncertain. out untouched then.
 bool refit_wavelengths(const double *counts, int pixels, const double old[4],
                        const double *lines_nm, struct refit *out, struct error *err);

@@ -64,6 +64,17 @@ static void an_instrument_of_whole_milliseconds_gets_whole_periods_too(void **st
     assert_int_equal(exposure_round(1, &qe), 8000);
 }
 
+static void any_exposure_that_the_instrument_knows_can_be_held(void **state)
+{
+    (void)state;
+    const struct exposure_limits qe = {60, 8000, 1000000, 1000};
+    assert_int_equal(exposure_hold(12346, &usual), 12350);
+    assert_int_equal(exposure_hold(700499, &usual), 700000);
+    assert_int_equal(exposure_hold(5, &usual), 1000);
+    assert_int_equal(exposure_hold(2e9, &usual), 1000000);
+    assert_int_equal(exposure_hold(12346, &qe), 12000);
+}
+
 struct scene {
     struct exposure e;
     int us, changes;
@@ -167,6 +178,7 @@ int main(void)
         cmocka_unit_test(exposure_steps_are_bounded),
         cmocka_unit_test(exposures_from_half_a_mains_period_on_are_its_multiples),
         cmocka_unit_test(an_instrument_of_whole_milliseconds_gets_whole_periods_too),
+        cmocka_unit_test(any_exposure_that_the_instrument_knows_can_be_held),
         cmocka_unit_test(exposure_settles_from_anywhere_without_swinging),
         cmocka_unit_test(after_any_step_of_light_it_comes_to_rest_and_stays),
         cmocka_unit_test(unsteady_light_is_not_hunted),

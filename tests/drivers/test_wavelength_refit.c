@@ -17,7 +17,7 @@ enum { PIXELS = 2048 };
 // The axis of a real Flame-S, and the same after a year.
 static const double true_nm[4] = {189.80809, 0.38583738, -1.9762801e-05, -9.4763608e-10};
 static const double old_nm[4] = {191.10, 0.38530, -1.95e-05, -9.6e-10};
-static const double close_nm = 0.05; // a seventh of a pixel, with noise and lines of 1.3 nm width
+static const double close_nm = 0.02; // a twentieth of a pixel, with noise and lines of 1.3 nm width
 
 static const double arithmetic = 1e-9;
 static const double sigmas = 4; // of a normal error, over 37 pixels
@@ -34,9 +34,9 @@ static double chance(uint64_t *seed)
 }
 
 // Gaussian lines between least_nm and most_nm on a noisy floor.
-static void lamp(double least_nm, double most_nm, double counts[PIXELS])
+static void lamp_of(double least_nm, double most_nm, double width_nm, double counts[PIXELS])
 {
-    const double sigma = 1.3 / 2.355;
+    const double sigma = width_nm / 2.355;
     uint64_t seed = 3;
     for (int i = 0; i < PIXELS; i++) {
         double nm = axis(true_nm, i);
@@ -47,6 +47,11 @@ static void lamp(double least_nm, double most_nm, double counts[PIXELS])
                 counts[i] += (3000 + 9000 * (l % 4)) * exp(-0.5 * off * off);
         }
     }
+}
+
+static void lamp(double least_nm, double most_nm, double counts[PIXELS])
+{
+    lamp_of(least_nm, most_nm, 1.3, counts);
 }
 
 static void a_drifted_axis_is_found_again(void **state)
@@ -86,6 +91,24 @@ static void each_line_tells_where_it_was_and_what_is_left(void **state)
     for (int i = 200; i < PIXELS; i += 50)
         worst = fmax(worst, fabs(axis(r.wavelength, i) - axis(true_nm, i)) / refit_sigma(&r, i));
     assert_true(worst < sigmas);
+}
+
+// At 1.3 nm the yellow pair stands apart; at 2.2 nm each would push the other aside by 0.3 nm.
+static void lines_that_run_into_each_other_are_left_out(void **state)
+{
+    (void)state;
+    static double counts[PIXELS];
+    struct refit r;
+    const double pair[] = {576.960, 579.066};
+    for (int broad = 0; broad < 2; broad++) {
+        int found = 0;
+        lamp_of(250, 880, broad ? 2.2 : 1.3, counts);
+        assert_true(refit_wavelengths(counts, PIXELS, old_nm, refit_mercury_argon, &r, NULL));
+        for (int i = 0; i < r.lines; i++)
+            found += r.line[i].nm == pair[0] || r.line[i].nm == pair[1];
+        assert_int_equal(found, broad ? 0 : 2);
+        assert_true(r.rms_nm < close_nm);
+    }
 }
 
 // A cubic through four places, each seen twice, is as uncertain there as the
@@ -196,6 +219,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_drifted_axis_is_found_again),
         cmocka_unit_test(each_line_tells_where_it_was_and_what_is_left),
+        cmocka_unit_test(lines_that_run_into_each_other_are_left_out),
         cmocka_unit_test(the_uncertainty_is_that_of_least_squares),
         cmocka_unit_test(a_list_of_wavelengths_has_its_coefficients),
         cmocka_unit_test(lines_at_one_end_alone_are_refused),
