@@ -8,14 +8,19 @@
 #include "files/ini.h"
 #include "files/write.h"
 
-// What the file holds: the model with its curves node by node.
+// What the file holds: the model with its curves and its residual node by node.
 struct display_file {
     char name[128];
+    int kind;
     double matrix[3][4];
+    double interaction[3][DISPLAY_TERMS];
+    struct lattice residual;
     double nodes[DISPLAY_NODES][3];
     struct display_origin origin;
     struct setting node_rows[DISPLAY_NODES + 1];
     char node_names[DISPLAY_NODES][12];
+    struct setting shift_rows[2 + LATTICE_NODES + 1];
+    char shift_names[LATTICE_NODES][12];
 };
 
 #define TEXT(in, field, preset_text, sentence)                                                     \
@@ -32,10 +37,40 @@ struct display_file {
 
 static const struct setting name_rows[] = {
     TEXT(struct display_file, name, "", "Panel and serial number."),
+    {.name = "model",
+     .type = SETTING_ENUM,
+     .offset = SETTING_FIELD(struct display_file, kind),
+     .choices = display_kind_names,
+     .unit = "",
+     .preset = "day",
+     .help = "Three curves and a matrix alone (day), or with channel interaction, or with a "
+             "smooth residual."},
     {0},
 };
 
 static const struct setting matrix_rows[] = {ROW("X", 0), ROW("Y", 1), ROW("Z", 2), {0}};
+
+#define TERMS(label, index)                                                                        \
+    {                                                                                              \
+        .name = label, .type = SETTING_VECTOR, .offset = index * DISPLAY_TERMS * sizeof(double),   \
+        .size = DISPLAY_TERMS, .least = -1e6, .most = 1e6, .unit = "cd/m2",                        \
+        .preset = "0 0 0 0 0 0",                                                                   \
+        .help = "Added by what red-green, green-blue, blue-red share, and by red, green, blue at " \
+                "middle drive."                                                                    \
+    }
+
+static const struct setting interaction_rows[] = {TERMS("X", 0), TERMS("Y", 1), TERMS("Z", 2), {0}};
+
+#define CORNER(field, values, sentence)                                                            \
+    {                                                                                              \
+        .name = #field, .type = SETTING_VECTOR, .offset = SETTING_FIELD(struct lattice, field),    \
+        .size = 3, .least = -1000, .most = 1000, .unit = "", .preset = values, .help = sentence    \
+    }
+
+static const struct setting corner_rows[2] = {
+    CORNER(least, "0 -100 -100", "L*, a*, b* where the residual's box begins."),
+    CORNER(most, "100 100 100", "L*, a*, b* where the residual's box ends."),
+};
 
 static const struct setting origin_rows[] = {
     TEXT(struct display_origin, instrument, "", "Instrument that measured."),
@@ -69,6 +104,27 @@ static const struct setting origin_rows[] = {
     {0},
 };
 
+static void name_shifts(struct display_file *file)
+{
+    memcpy(file->shift_rows, corner_rows, sizeof corner_rows);
+    for (int x = 0; x < LATTICE_SIDE; x++)
+        for (int y = 0; y < LATTICE_SIDE; y++)
+            for (int z = 0; z < LATTICE_SIDE; z++) {
+                int k = lattice_node(x, y, z);
+                snprintf(file->shift_names[k], sizeof file->shift_names[k], "node_%d%d%d", x, y, z);
+                file->shift_rows[2 + k] = (struct setting){
+                    .name = file->shift_names[k],
+                    .type = SETTING_VECTOR,
+                    .offset = offsetof(struct lattice, node) + 3 * sizeof(double) * (size_t)k,
+                    .size = 3,
+                    .least = -1000,
+                    .most = 1000,
+                    .unit = "",
+                    .preset = "0 0 0",
+                    .help = "B-spline coefficient of the shift of L*, a*, b*."};
+            }
+}
+
 static struct display_file *file_create(struct error *err)
 {
     struct display_file *file = calloc(1, sizeof *file);
@@ -88,16 +144,38 @@ static struct display_file *file_create(struct error *err)
             .unit = "",
             .help = "Linear light of red, green and blue at this 1020th of full code."};
     }
+    name_shifts(file);
     return file;
 }
 
-static void sections_of(struct display_file *file, struct settings_section sections[5])
+enum { SECTIONS = 7 };
+
+static void sections_of(struct display_file *file, struct settings_section sections[SECTIONS])
 {
     sections[0] = (struct settings_section){"display", name_rows, file};
     sections[1] = (struct settings_section){"origin", origin_rows, &file->origin};
     sections[2] = (struct settings_section){"matrix", matrix_rows, file->matrix};
     sections[3] = (struct settings_section){"curves", file->node_rows, file->nodes};
-    sections[4] = (struct settings_section){0};
+    sections[4] = (struct settings_section){"interaction", interaction_rows, file->interaction};
+    sections[5] = (struct settings_section){"residual", file->shift_rows, &file->residual};
+    sections[6] = (struct settings_section){0};
+}
+
+// Drops the sections that the kind does not use.
+static void keep_used(enum display_kind kind, struct settings_section sections[SECTIONS])
+{
+    switch (kind) {
+    case DISPLAY_DAY:
+        sections[4] = sections[6];
+        break;
+    case DISPLAY_INTERACTION:
+        sections[5] = sections[6];
+        break;
+    case DISPLAY_RESIDUAL:
+        sections[4] = sections[5];
+        sections[5] = sections[6];
+        break;
+    }
 }
 
 // Other programs' texts may hold what an INI value cannot.
@@ -115,12 +193,15 @@ static void make_plain(char *text)
 bool display_save(const char *path, const struct display_model *model,
                   const struct display_origin *origin, struct error *err)
 {
-    struct settings_section sections[5];
+    struct settings_section sections[SECTIONS];
     struct display_file *file = file_create(err);
     if (!file)
         return false;
     memcpy(file->name, model->name, sizeof file->name);
+    file->kind = model->kind;
     memcpy(file->matrix, model->matrix, sizeof file->matrix);
+    memcpy(file->interaction, model->interaction, sizeof file->interaction);
+    file->residual = model->residual;
     for (int k = 0; k < DISPLAY_NODES; k++)
         for (int c = 0; c < 3; c++)
             file->nodes[k][c] = model->curve[c][k];
@@ -130,9 +211,22 @@ bool display_save(const char *path, const struct display_model *model,
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
         make_plain(texts[i]);
     sections_of(file, sections);
+    keep_used(model->kind, sections);
     bool saved = ini_save(path, sections, err);
     free(file);
     return saved;
+}
+
+static void model_of(const struct display_file *file, struct display_model *model)
+{
+    memcpy(model->name, file->name, sizeof model->name);
+    model->kind = (enum display_kind)file->kind;
+    memcpy(model->matrix, file->matrix, sizeof model->matrix);
+    memcpy(model->interaction, file->interaction, sizeof model->interaction);
+    model->residual = file->residual;
+    for (int k = 0; k < DISPLAY_NODES; k++)
+        for (int c = 0; c < 3; c++)
+            model->curve[c][k] = file->nodes[k][c];
 }
 
 // The node that display_model_prepare complains of, or -1.
@@ -172,27 +266,30 @@ static int line_of_key(const char *path, const char *key)
 // Puts file, line and section before what display_model_prepare said.
 static bool blame(const char *path, const struct display_file *file, struct error *err)
 {
+    struct display_model day = {0};
     int node = bad_node(file);
     const char *key = node < 0 ? matrix_rows[0].name : file->node_names[node];
-    return while_doing(err, "%s:%d: [%s]", path, line_of_key(path, key),
-                       node < 0 ? "matrix" : "curves");
+    const char *section = node < 0 ? "matrix" : "curves";
+    model_of(file, &day);
+    day.kind = DISPLAY_DAY;
+    if (file->kind != DISPLAY_DAY && display_model_prepare(&day, NULL)) {
+        key = name_rows[1].name;
+        section = display_kind_names[file->kind];
+    }
+    return while_doing(err, "%s:%d: [%s]", path, line_of_key(path, key), section);
 }
 
 bool display_load(const char *path, struct display_model *model, struct display_origin *origin,
                   struct error *err)
 {
-    struct settings_section sections[5];
+    struct settings_section sections[SECTIONS];
     struct display_model loaded = {0};
     struct display_file *file = file_create(err);
     if (!file)
         return false;
     sections_of(file, sections);
     bool fine = ini_load(path, sections, err);
-    memcpy(loaded.name, file->name, sizeof loaded.name);
-    memcpy(loaded.matrix, file->matrix, sizeof loaded.matrix);
-    for (int k = 0; k < DISPLAY_NODES; k++)
-        for (int c = 0; c < 3; c++)
-            loaded.curve[c][k] = file->nodes[k][c];
+    model_of(file, &loaded);
     if (fine && !display_model_prepare(&loaded, err))
         fine = blame(path, file, err);
     if (fine) {

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The fitted display model on disk (INI): boothcal writes it, boothd loads it.
+// [display] model says which it is; only the sections that it uses are written
+// ([interaction] or [residual]). A file without that key is plain Day, as
+// files were before the others.
 #ifndef CONFIG_DISPLAY_FILE_H
 #define CONFIG_DISPLAY_FILE_H
 

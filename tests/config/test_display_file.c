@@ -96,8 +96,85 @@ static void what_is_saved_is_loaded_to_the_last_bit(void **state)
     struct error err = {0};
     assert_true(display_save(path, &m, &origin, &err));
     assert_true(display_load(path, &loaded, &from, &err));
+    m.residual.least = (struct vec3){0, -100, -100}; // not in the file: its presets
+    m.residual.most = (struct vec3){100, 100, 100};
     assert_memory_equal(&loaded, &m, sizeof m);
     assert_memory_equal(&from, &origin, sizeof from);
+}
+
+static void check_kept(const struct display_model *m)
+{
+    struct display_model loaded = {0};
+    struct error err = {0};
+    assert_true(display_save(path, m, &origin, &err));
+    if (!display_load(path, &loaded, NULL, &err))
+        fail_msg("%s", err.text);
+    assert_memory_equal(&loaded, m, sizeof *m);
+}
+
+static struct display_model interacting(void)
+{
+    struct display_model m = model();
+    m.kind = DISPLAY_INTERACTION;
+    for (int i = 0; i < 3; i++)
+        for (int t = 0; t < DISPLAY_TERMS; t++)
+            m.interaction[i][t] = 0.1 * i - 1.0 / 3 * t;
+    m.residual.least = (struct vec3){0, -100, -100}; // as the file presets them
+    m.residual.most = (struct vec3){100, 100, 100};
+    assert_true(display_model_prepare(&m, NULL));
+    return m;
+}
+
+static struct display_model corrected(void)
+{
+    struct display_model m = model();
+    m.kind = DISPLAY_RESIDUAL;
+    m.residual.least = (struct vec3){0, -99.5, -115.25};
+    m.residual.most = (struct vec3){100, 98.1, 97};
+    for (int k = 0; k < LATTICE_NODES; k++)
+        for (int n = 0; n < 3; n++)
+            m.residual.node[k][n] = sin(k + n) / 3;
+    assert_true(display_model_prepare(&m, NULL));
+    return m;
+}
+
+static void every_kind_is_kept_to_the_last_bit(void **state)
+{
+    (void)state;
+    struct display_model m = interacting();
+    check_kept(&m);
+    m = corrected();
+    check_kept(&m);
+}
+
+static void a_file_without_a_model_key_is_plain_day(void **state)
+{
+    (void)state;
+    struct display_model m = model(), loaded = interacting();
+    struct error err = {0};
+    assert_true(display_save(path, &m, &origin, &err));
+    write_with("model = day\n", "");
+    assert_true(display_load(path, &loaded, NULL, &err));
+    assert_int_equal(loaded.kind, DISPLAY_DAY);
+}
+
+static void an_addition_that_folds_is_refused_by_its_section(void **state)
+{
+    (void)state;
+    struct display_model m = corrected();
+    struct error err = {0};
+    assert_true(display_save(path, &m, &origin, &err));
+    write_with("node_333 = ", "node_333 = 900 0 0\n#");
+    assert_false(display_load(path, &m, NULL, &err));
+    assert_non_null(strstr(err.text, ":3: [residual]: residual: two inputs"));
+    m = interacting();
+    m.interaction[1][2] = 5000;
+    assert_true(display_save(path, &m, &origin, &err));
+    assert_false(display_load(path, &m, NULL, &err));
+    assert_non_null(strstr(err.text, ":3: [interaction]: interaction: two inputs"));
+    write_with("model = interaction", "model = daily");
+    assert_false(display_load(path, &m, NULL, &err));
+    assert_non_null(strstr(err.text, "daily"));
 }
 
 static void texts_an_ini_cannot_hold_are_made_plain(void **state)
@@ -158,6 +235,9 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_saved_is_loaded_to_the_last_bit),
+        cmocka_unit_test(every_kind_is_kept_to_the_last_bit),
+        cmocka_unit_test(a_file_without_a_model_key_is_plain_day),
+        cmocka_unit_test(an_addition_that_folds_is_refused_by_its_section),
         cmocka_unit_test(texts_an_ini_cannot_hold_are_made_plain),
         cmocka_unit_test(a_curve_that_falls_is_refused),
         cmocka_unit_test(a_missing_node_is_refused_by_name),
