@@ -136,11 +136,30 @@ void bench_instrument(const json_t *reply, char *name, size_t size)
     snprintf(name, size, "%s %s", model ? model : "unnamed", serial ? serial : "");
 }
 
+static json_t *teach_call(struct bench *b, const char *lamp, int readings, struct error *err)
+{
+    return daemon_call(
+        b, json_pack("{ss,ss,si}", "do", CONTROL_TEACH, "lamp", lamp, "readings", readings), err);
+}
+
+bool bench_probe(struct bench *b, const char *lamp, int readings, double *lux, struct error *err)
+{
+    json_t *reply = teach_call(b, lamp, readings, err);
+    if (!reply)
+        return while_doing(err, "watching lamp %s", lamp);
+    *lux = json_number_value(json_object_get(reply, "lux"));
+    json_object_del(reply, "ok");
+    json_object_del(reply, "nm");
+    json_object_del(reply, "irradiance");
+    json_object_set_new(reply, "what", json_sprintf("light of %s", lamp));
+    json_array_append_new(b->readings, reply);
+    return true;
+}
+
 bool bench_teach(struct bench *b, const char *lamp, int readings, struct taught *out,
                  struct error *err)
 {
-    json_t *request = json_pack("{ss,ss,si}", "do", CONTROL_TEACH, "lamp", lamp, "readings", readings);
-    json_t *reply = daemon_call(b, request, err);
+    json_t *reply = teach_call(b, lamp, readings, err);
     if (!reply || !take_spectrum(reply, &out->irradiance, err)) {
         json_decref(reply);
         return while_doing(err, "teaching lamp %s", lamp);

@@ -69,6 +69,9 @@ struct taught {
 bool bench_teach(struct bench *b, const char *lamp, int readings, struct taught *out,
                  struct error *err);
 
+// Illuminance of the lamp now on from `readings` fresh readings; the spectrum is not kept.
+bool bench_probe(struct bench *b, const char *lamp, int readings, double *lux, struct error *err);
+
 // Waits until the daemon is sure of lamp ("" = dark), at most timeout_s.
 bool bench_await_lamp(struct bench *b, const char *lamp, double timeout_s, struct error *err);
 

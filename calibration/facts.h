@@ -7,10 +7,11 @@
 #include <jansson.h>
 #include <stdbool.h>
 
+#include "calibration/spots.h"
 #include "calibration/statistics.h"
 #include "colorimetry/colour.h"
 
-enum { FACTS_PATCHES = 64, FACTS_LAMPS = 8, FACTS_POSES = 32, FACTS_SPOTS = 7 };
+enum { FACTS_PATCHES = 64, FACTS_LAMPS = 8, FACTS_POSES = 32 };
 
 // One patch under one lamp. Tristimulus values are absolute, cd/m2, 1931 2
 // degrees, unless a name says otherwise.
@@ -41,7 +42,7 @@ struct lamp_report {
     struct cct cct;
     double map_scale; // median of the spot readings over the map, at the taught level
     int spots;
-    double spot_ratios[FACTS_SPOTS];
+    double spot_ratios[SPOTS_MOST];
     struct xyz white_taught;                    // perfect diffuser under the taught spectrum, Y = 100
     struct xyz white_reference, white_measured; // perfect diffuser at the screen's centre, cd/m2
     double white_error_percent;                 // of luminance

@@ -13,6 +13,8 @@ bool light_picture(const char *path, const struct luminance_map *map,
                    struct error *err);
 
 // The subcommands; argv[0] is the subcommand's own name.
+int light_teach_command(int argc, char **argv);
+int light_list_command(int argc, char **argv);
 int light_points_command(int argc, char **argv);
 
 #endif

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "base/number.h"
 #include "calibration/commands.h"
 #include "calibration/report.h"
 #include "config/paths.h"
@@ -27,6 +28,8 @@ static const char USAGE[] =
     "  --maps FOLDER        luminance maps ceiling-LAMP.exr (cd/m2, channel Y)\n"
     "  --lamp NAME[=TEXT]   a lamp of the booth, in order; TEXT is noted in the report\n"
     "                       (default: A, D50, D65)\n"
+    "  --lamp-drift PERCENT a lamp stands still when it changes by less a minute\n"
+    "                       (default: 0.5; 20 in a rehearsal)\n"
     "  --material NAME      chart to proof (default: colorchecker24)\n"
     "  --rehearse           few patches: shows that the chain works, proves nothing\n"
     "  -o, --out FOLDER     where report.html, report.json, display.ti3 and pictures go\n"
@@ -39,6 +42,7 @@ struct options {
     const char *config, *socket, *booth, *maps, *out, *material;
     const char *lamps[FACTS_LAMPS];
     int lamp_count;
+    double lamp_drift;
     bool rehearse;
 };
 
@@ -55,8 +59,10 @@ static int parse(int argc, char **argv, struct options *o)
         {"booth", required_argument, NULL, 'b'},  {"maps", required_argument, NULL, 'm'},
         {"lamp", required_argument, NULL, 'l'},   {"material", required_argument, NULL, 'k'},
         {"rehearse", no_argument, NULL, 'r'},     {"out", required_argument, NULL, 'o'},
-        {"help", no_argument, NULL, 'h'},         {0},
+        {"help", no_argument, NULL, 'h'},         {"lamp-drift", required_argument, NULL, 'd'},
+        {0},
     };
+    const char *end;
     *o = (struct options){.material = "colorchecker24"};
     for (int c; (c = getopt_long(argc, argv, "o:h", LONG, NULL)) != -1;) {
         switch (c) {
@@ -71,6 +77,10 @@ static int parse(int argc, char **argv, struct options *o)
             if (o->lamp_count == FACTS_LAMPS)
                 return misused("more than 8 lamps");
             o->lamps[o->lamp_count++] = optarg;
+            break;
+        case 'd':
+            if (!number_parse(optarg, &end, &o->lamp_drift) || *end || !(o->lamp_drift > 0))
+                return misused("--lamp-drift wants a number above 0");
             break;
         case 'h': fputs(USAGE, stdout); return -1;
         default: return COMMAND_USAGE;
@@ -208,7 +218,7 @@ int command_session(int argc, char **argv)
     bool fine = false, all_reached = false;
     if (facts && s) {
         *s = (struct session){.facts = facts, .material = o.material,
-                              .rehearse = o.rehearse};
+                              .rehearse = o.rehearse, .lamp_drift = o.lamp_drift / 100};
         fine = run(s, &o, &err);
         all_reached = reached(facts);
         bench_close(&s->bench);

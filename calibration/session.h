@@ -16,6 +16,7 @@ struct session {
     char maps[400];        // folder of luminance maps "ceiling-<lamp>.exr", absolute
     const char *material;  // chart to proof
     bool rehearse;         // few patches only: shows that the chain works
+    double lamp_drift;     // relative change per minute of a lamp that stands still, 0 = the plan's
 };
 
 // Path of the luminance map of lamp i.

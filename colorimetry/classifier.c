@@ -156,9 +156,14 @@ static double lux_of(const struct spectrum *irradiance)
     return xyz_absolute(irradiance, OBSERVER_1931_2).Y;
 }
 
+double lamp_limit(double threshold, double spread)
+{
+    return threshold + spread * SPREAD_SHARE;
+}
+
 static double limit_of(const struct classifier *c, int i)
 {
-    return c->distance + c->lamps[i].spread * SPREAD_SHARE;
+    return lamp_limit(c->distance, c->lamps[i].spread);
 }
 
 // Distance in units of the lamp's limit; what is believed counts as nearer.

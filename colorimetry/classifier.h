@@ -55,6 +55,11 @@ struct lamp_belief {
 // the other one is of the same kind (two incandescent lamps).
 double lamp_distance(const struct spectrum *taught, const struct spectrum *live);
 
+// Greatest distance at which a reading still counts as a lamp that was taught
+// with that spread: noise leaves a third of it in a band. threshold: as
+// classifier.distance.
+double lamp_limit(double threshold, double spread);
+
 // Sets limits (dark 5 lx, distance 0.01, confirmations 2) and forgets state.
 void classifier_reset(struct classifier *c);
 
