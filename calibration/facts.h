@@ -63,11 +63,20 @@ struct display_report {
     double white_drift_percent; // largest change of repeated white readings
 };
 
+// How the display's light depends on direction and place; see view_fit.h.
+struct view_report {
+    bool measured;
+    int directions, places;
+    double before_de00, after_de00, before_percent, after_percent, place_de00, place_percent;
+};
+
 // White shown after moving the screen or the head.
 struct pose_report {
     double tilt_deg, tilt_seen_deg;
     struct vec3 eye, eye_seen; // booth frame, m
     bool moved_screen;         // white was measured again
+    bool off_axis;             // and the eye lies off_normal_deg off the screen's normal
+    double off_normal_deg;
     struct xyz reference, measured;
     double error_percent;
 };
@@ -79,6 +88,7 @@ struct session_facts {
     int lamp_count, pose_count;
     struct lamp_report lamps[FACTS_LAMPS];
     struct display_report display;
+    struct view_report view;
     struct pose_report poses[FACTS_POSES];
     json_t *settings; // of the daemon: its whole status at the end
     json_t *readings; // array: every reply of the radiometer and every taught spectrum, as it came

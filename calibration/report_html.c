@@ -219,13 +219,31 @@ static void display_section(FILE *out, const struct display_report *d)
     fprintf(out, "</table>\n");
 }
 
+static void view(FILE *out, const struct view_report *v)
+{
+    if (!v->measured)
+        return;
+    fprintf(out,
+            "<h2>Display by direction and place</h2>\n<table><thead><tr><th>white</th><th>largest "
+            "difference</th><th>CIEDE2000</th></tr></thead>\n"
+            "<tr><td>%d directions, uncorrected</td><td>%+.1f %%</td><td>%.2f</td></tr>\n"
+            "<tr><td>the same, corrected</td><td>%+.2f %%</td><td>%.2f</td></tr>\n"
+            "<tr><td>%d places, uncorrected</td><td>%+.1f %%</td><td>%.2f</td></tr>\n</table>\n",
+            v->directions, v->before_percent, v->before_de00, v->after_percent, v->after_de00,
+            v->places, v->place_percent, v->place_de00);
+}
+
 static void poses(FILE *out, const struct session_facts *f)
 {
     fprintf(out, "<h2>Screen tilted, head moved</h2>\n<table><thead><tr><th>tilt</th><th>seen</th>"
+                 "<th>eye off the normal</th>"
                  "<th>eye off by, mm</th><th>white reference</th><th>white shown, cd/m²</th><th>error</th></tr></thead>\n");
     for (int i = 0; i < f->pose_count; i++) {
         const struct pose_report *p = &f->poses[i];
-        fprintf(out, "<tr><td>%.1f°</td><td>%.2f°</td><td>%.1f</td>", p->tilt_deg, p->tilt_seen_deg,
+        fprintf(out, "<tr><td>%.1f°</td><td>%.2f°</td><td>", p->tilt_deg, p->tilt_seen_deg);
+        if (p->off_axis)
+            fprintf(out, "%.0f°", p->off_normal_deg);
+        fprintf(out, "</td><td>%.1f</td>",
                 1000 * vec3_length(vec3_sub(p->eye, p->eye_seen)));
         if (p->moved_screen)
             fprintf(out, "<td>%.1f</td><td>%.1f</td><td>%+.2f %%</td></tr>\n", p->reference.Y,
@@ -273,6 +291,7 @@ bool report_as_html(const struct session_facts *f, FILE *out, struct error *err)
     spectra(out, f);
     chromaticities(out, f);
     display_section(out, &f->display);
+    view(out, &f->view);
     poses(out, f);
     raw(out, "Settings", f->settings, JSON_INDENT(2));
     raw_readings(out, f->readings);

@@ -66,12 +66,26 @@ static json_t *json_pose(const struct pose_report *p)
     json_t *out = json_pack("{sf,sf,s[fff],s[fff]}", "tilt_deg", p->tilt_deg, "tilt_seen_deg",
                             p->tilt_seen_deg, "eye_m", p->eye.x, p->eye.y, p->eye.z, "eye_seen_m",
                             p->eye_seen.x, p->eye_seen.y, p->eye_seen.z);
+    if (p->off_axis)
+        json_object_set_new(out, "off_normal_deg", json_real(p->off_normal_deg));
     if (p->moved_screen) {
         json_object_set_new(out, "white_reference_cdm2", json_xyz(p->reference));
         json_object_set_new(out, "white_measured_cdm2", json_xyz(p->measured));
         json_object_set_new(out, "white_luminance_error_percent", json_real(p->error_percent));
     }
     return out;
+}
+
+// Null when it was not measured.
+static json_t *json_view(const struct view_report *v)
+{
+    if (!v->measured)
+        return json_null();
+    return json_pack("{si,si,sf,sf,sf,sf,sf,sf}", "directions", v->directions, "places", v->places,
+                     "white_before_de00", v->before_de00, "white_after_de00", v->after_de00,
+                     "white_before_percent", v->before_percent, "white_after_percent",
+                     v->after_percent, "place_de00", v->place_de00, "place_percent",
+                     v->place_percent);
 }
 
 static json_t *json_published(void)
@@ -97,12 +111,12 @@ json_t *report_as_json(const struct session_facts *f)
     for (int i = 0; i < f->pose_count; i++)
         json_array_append_new(poses, json_pose(&f->poses[i]));
     return json_pack(
-        "{ss,ss,ss,ss,ss,sb,ss,sf,so,so,so,so,sO,sO,s{sf,sf,sf}}", "booth", f->booth, "started", f->started,
+        "{ss,ss,ss,ss,ss,sb,ss,sf,so,so,so,so,so,sO,sO,s{sf,sf,sf}}", "booth", f->booth, "started", f->started,
         "finished", f->finished, "software", f->software, "observer", f->observer, "emulated",
         f->emulated, "reference",
         f->truth_emulated ? "physical sample in the emulated booth, 1 nm integration"
                           : "taught spectrum and luminance map, 1 nm integration",
-        "seconds", f->seconds, "display", json_display(&f->display), "lamps", lamps, "poses", poses,
+        "seconds", f->seconds, "display", json_display(&f->display), "view", json_view(&f->view), "lamps", lamps, "poses", poses,
         "published_mean_std_p90_max", json_published(), "settings", f->settings, "readings",
         f->readings, "targets", "de00_mean", PROOF_MEAN_MOST, "de00_max", PROOF_MAX_MOST,
         "white_percent", PROOF_WHITE_PERCENT_MOST);

@@ -54,6 +54,13 @@ void report_as_text(const struct session_facts *f, FILE *out)
     fprintf(out, "Display model: %d patches fitted, dE00 mean %.2f max %.2f; %d others, mean %.2f max %.2f\n",
             d->patches, d->fit.mean, d->fit.max, d->verified, d->verification.mean,
             d->verification.max);
+    if (f->view.measured)
+        fprintf(out,
+                "Display by direction: %d directions, white up to %+.1f %% (dE00 %.2f), corrected to "
+                "%+.2f %% (%.2f); by place: up to %+.1f %% (%.2f)\n",
+                f->view.directions, f->view.before_percent, f->view.before_de00,
+                f->view.after_percent, f->view.after_de00, f->view.place_percent,
+                f->view.place_de00);
     for (int i = 0; i < f->lamp_count; i++)
         lamp_table(out, &f->lamps[i]);
     fprintf(out, "\nMoved screen and head\n");
@@ -61,6 +68,8 @@ void report_as_text(const struct session_facts *f, FILE *out)
         const struct pose_report *p = &f->poses[i];
         fprintf(out, "  tilt %5.1f (seen %6.2f) deg, eye off by %4.1f mm", p->tilt_deg,
                 p->tilt_seen_deg, 1000 * vec3_length(vec3_sub(p->eye, p->eye_seen)));
+        if (p->off_axis)
+            fprintf(out, ", %.0f deg off the normal", p->off_normal_deg);
         if (p->moved_screen)
             fprintf(out, ", white %.1f cd/m2, shown %.1f (%+.2f %%)", p->reference.Y, p->measured.Y,
                     p->error_percent);

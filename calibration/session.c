@@ -163,6 +163,8 @@ static bool steps(struct session *s, struct error *err)
     say(s, "Characterising the display in the dark booth");
     if (!session_characterise(s, err))
         return false;
+    if (!session_view(s, err))
+        return false;
     say(s, "Proofing the chart");
     for (int i = 0; i < f->lamp_count; i++)
         if (!session_proof(s, i, err))

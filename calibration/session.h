@@ -31,11 +31,23 @@ bool session_teach(struct session *s, int lamp, struct error *err);
 // model, saves it where boothd loads it, checks it on the patches kept apart.
 bool session_characterise(struct session *s, struct error *err);
 
+// Where the settings name a [display] view: reads the display from other
+// directions and at other places, fits, and saves it where boothd loads it.
+bool session_view(struct session *s, struct error *err);
+
+// Where the head is at rest: the settings' default eye, booth frame.
+struct vec3 session_eye(const struct session *s);
+
+// Aims the radiometer at the screen's centre: from the eye when the display's
+// light by direction is known, else along the normal.
+bool session_aim(struct session *s, struct vec3 eye, struct error *err);
+
 // Shows each patch of the chart at the screen's centre under lamp i, measures
 // it and its reference, and captures the whole chart as PNG.
 bool session_proof(struct session *s, int lamp, struct error *err);
 
-// Tilts the screen and moves the head under the last lamp; white again.
+// Tilts the screen and moves the head under the last lamp; white again, and
+// where directions count also from 0, 15 and 25 degrees off the normal.
 bool session_poses(struct session *s, struct error *err);
 
 #endif

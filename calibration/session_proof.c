@@ -9,9 +9,11 @@
 #include "config/bands_file.h"
 #include "config/materials.h"
 
-enum { SETTLE_ATTEMPTS = 20, LOOKS = 5 };
+enum { SETTLE_ATTEMPTS = 60, LOOKS = 5 };
 static const double STILL_DEG = 0.1, STILL_M = 0.015; // twice what noise moves them between looks
-static const double POSE_TILTS_DEG[] = {10, 20, 45};
+static const double ASKED_DEG = 3; // a person sets no tilt better
+static const double POSE_TILTS_DEG[] = {20, 45, 60};
+static const double AXIS_DEG[] = {0, 15, 25}, AXIS_TILT_DEG = 60, AXIS_DISTANCE_M = 0.7;
 static const struct vec3 POSE_EYES[] = {{-0.10, 0.55, 0.60}, {0.12, 0.50, 0.70}};
 
 // What the patches are without an emulated booth to ask: their spectra under
@@ -137,7 +139,7 @@ bool session_proof(struct session *s, int index, struct error *err)
     struct lamp_report *lamp = &s->facts->lamps[index];
     struct bench *b = &s->bench;
     if (!bench_lamp(b, lamp->name, err) || !bench_await_lamp(b, lamp->name, 30, err) ||
-        !bench_aim_screen(b, s->settings.screen.width_px / 2.0, s->settings.screen.height_px / 2.0, err))
+        !session_aim(s, session_eye(s), err))
         return false;
     struct material chart = {0};
     if (!material_load(&s->settings, s->material, &chart, err))
@@ -177,25 +179,61 @@ static bool settle(struct session *s, struct pose_report *pose, struct error *er
         }
         struct vec3 before = pose->eye_seen;
         pose->eye_seen = vec3_scale(eyes, 1.0 / LOOKS);
-        if (attempt && most - least < STILL_DEG &&
+        if (attempt && most - least < STILL_DEG && fabs(most - pose->tilt_deg) < ASKED_DEG &&
             vec3_length(vec3_sub(before, pose->eye_seen)) < STILL_M)
             return true;
     }
-    return fail(err, ERROR_RETRY, "tilt or head did not settle");
+    return fail(err, ERROR_RETRY,
+                "tilt or head did not settle: %.1f degrees are asked for, %.1f seen", pose->tilt_deg,
+                pose->tilt_seen_deg);
+}
+
+static bool white_again(struct session *s, struct pose_report *pose, struct error *err)
+{
+    const struct lamp_report *lamp = &s->facts->lamps[s->facts->lamp_count - 1];
+    pose->moved_screen = true;
+    if (!settle(s, pose, err) || !session_aim(s, pose->eye, err) ||
+        !measure_white(s, lamp, &pose->reference, &pose->measured, err))
+        return false;
+    if (!(pose->reference.Y > 0))
+        return fail(err, ERROR_DATA, "tilt %.0f: the reference is dark", pose->tilt_deg);
+    pose->error_percent = 100 * (pose->measured.Y / pose->reference.Y - 1);
+    return true;
 }
 
 static bool tilted(struct session *s, double tilt_deg, struct pose_report *pose, struct error *err)
 {
-    const struct lamp_report *lamp = &s->facts->lamps[s->facts->lamp_count - 1];
-    pose->moved_screen = true;
     pose->tilt_deg = tilt_deg;
-    if (!bench_tilt(&s->bench, tilt_deg, err) || !settle(s, pose, err) ||
-        !measure_white(s, lamp, &pose->reference, &pose->measured, err))
+    return bench_tilt(&s->bench, tilt_deg, err) && white_again(s, pose, err);
+}
+
+// An upright screen, the eye before it and aside: down to the right, where a
+// camera behind the screen still sees the head.
+static bool off_axis(struct session *s, double off_normal_deg, struct pose_report *pose,
+                     struct error *err)
+{
+    double angle = off_normal_deg * M_PI / 180;
+    struct vec3 in_screen = vec3_scale((struct vec3){sin(angle) * M_SQRT1_2, -sin(angle) * M_SQRT1_2,
+                                                     cos(angle)},
+                                       AXIS_DISTANCE_M);
+    pose->off_axis = true;
+    pose->off_normal_deg = off_normal_deg;
+    pose->tilt_deg = AXIS_TILT_DEG;
+    pose->eye = rigid_apply(stand_pose(&s->settings.stand.stand, AXIS_TILT_DEG), in_screen);
+    return bench_head(&s->bench, pose->eye, err) && white_again(s, pose, err);
+}
+
+static bool off_axes(struct session *s, struct error *err)
+{
+    int count = sizeof AXIS_DEG / sizeof *AXIS_DEG;
+    if (!bench_tilt(&s->bench, AXIS_TILT_DEG, err))
         return false;
-    if (!(pose->reference.Y > 0))
-        return fail(err, ERROR_DATA, "tilt %.0f: the reference is dark", tilt_deg);
-    pose->error_percent = 100 * (pose->measured.Y / pose->reference.Y - 1);
-    return true;
+    for (int i = 0; i < count; i++) {
+        if (!off_axis(s, AXIS_DEG[i], &s->facts->poses[s->facts->pose_count++], err))
+            return while_doing(err, "%.0f degrees off the normal", AXIS_DEG[i]);
+        bench_progress(&s->bench, "off the normal", i + 1, count);
+    }
+    return bench_tilt(&s->bench, s->settings.stand.default_tilt_deg, err);
 }
 
 bool session_poses(struct session *s, struct error *err)
@@ -204,8 +242,7 @@ bool session_poses(struct session *s, struct error *err)
     int tilts = sizeof POSE_TILTS_DEG / sizeof *POSE_TILTS_DEG;
     int eyes = sizeof POSE_EYES / sizeof *POSE_EYES;
     double rest_deg = s->settings.stand.default_tilt_deg;
-    struct vec3 eye = {s->settings.tracker.default_eye_m[0], s->settings.tracker.default_eye_m[1],
-                       s->settings.tracker.default_eye_m[2]};
+    struct vec3 eye = session_eye(s);
     for (int i = 0; i < tilts + 1; i++) {
         struct pose_report *p = &f->poses[f->pose_count++];
         p->eye = eye;
@@ -221,5 +258,5 @@ bool session_poses(struct session *s, struct error *err)
             return false;
         bench_progress(&s->bench, "head", i + 1, eyes);
     }
-    return bench_head(&s->bench, eye, err);
+    return (!f->view.measured || off_axes(s, err)) && bench_head(&s->bench, eye, err);
 }

@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/status.h"
 
+#include <math.h>
+
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "base/clock.h"
+
+static const double DIRECTION_SLACK = 0.02; // a degree: an eye that moves there changes little
 
 __attribute__((format(printf, 2, 3))) static void warn(struct snapshot *s, const char *format, ...)
 {
@@ -72,6 +76,19 @@ static void warn_of_output(struct snapshot *s)
         warn(s, "the monitor's gamma ramp is not known: it must be neutral");
 }
 
+// Beyond the measured directions the display's light is taken as at their edge.
+static void warn_of_direction(const struct booth *b, struct snapshot *s)
+{
+    const struct scene *scene = &b->scene;
+    if (scene->kind != SCENE_SURFACE || !scene->view)
+        return;
+    struct vec3 eye = rigid_apply(rigid_inverse(scene->booth_from_screen), scene->eye);
+    double sine = hypot(eye.x, eye.y) / vec3_length(eye), most = scene->view->sine_most;
+    if (!(eye.z > 0) || sine > most + DIRECTION_SLACK)
+        warn(s, "the eye is %.0f degrees off the screen's normal; the display was measured to %.0f",
+             acos(eye.z / vec3_length(eye)) * 180 / M_PI, asin(most) * 180 / M_PI);
+}
+
 static void warnings(const struct booth *b, struct snapshot *s)
 {
     char text[sizeof *s->warnings];
@@ -88,6 +105,7 @@ static void warnings(const struct booth *b, struct snapshot *s)
              *s->lamp_name ? "the lamp is taken for granted" : "no lamp is known");
     warn_of_belief(s, "tilt", &s->state.tilt.belief, booth_accelerometer(&s->settings));
     warn_of_belief(s, "place of the eye", &s->state.eye.belief, booth_tracker(&s->settings));
+    warn_of_direction(b, s);
     if (s->out_of_gamut > 0)
         warn(s, "%.2f %% of the screen is out of the display's gamut", 100 * s->out_of_gamut);
 }
