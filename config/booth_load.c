@@ -32,6 +32,7 @@ static void path_fields(struct booth_settings *b, struct path_field out[PATH_FIE
         FIELD("spectrometer", "calibration", b->spectrometer.options.calibration),
         FIELD("spectrometer", "darks", b->spectrometer.options.darks),
         FIELD("spectrometer", "file", b->spectrometer.options.file),
+        FIELD("spectrometer", "reference", b->spectrometer.options.reference),
         FIELD("accelerometer", "port", b->accelerometer.options.port),
         FIELD("radiometer", "port", b->radiometer.options.port),
         FIELD("display", "model", b->display.model),

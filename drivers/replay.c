@@ -8,13 +8,14 @@
 #include <sys/stat.h>
 
 #include "drivers/deadline.h"
+#include "drivers/jaz.h"
 
 enum { LEAST_MS = 50, MOST_MS = 1000 };
 
 struct spectrometer {
     struct spectrometer_options options;
     struct vendor_file file;
-    struct spectrum irradiance;
+    struct jaz_light light;
     struct timespec changed;
     off_t size;
 };
@@ -49,21 +50,62 @@ static bool look(const struct spectrometer *s, struct stat *out, struct error *e
            fail(err, ERROR_GONE, "%s: the file is not there", s->options.file);
 }
 
+static bool by_calibration(const struct spectrometer_options *o, const struct vendor_file *file,
+                           struct jaz_light *out, struct error *err)
+{
+    struct table table = {0};
+    const struct jaz_worth worth = {.calibration = &table, .collector_mm2 = o->collector_mm2};
+    bool fine =
+        csv_load(o->calibration, &table, err) && jaz_irradiance(file, &worth, o->boxcar, out, err);
+    table_fini(&table);
+    return fine;
+}
+
+static bool by_reference(const struct spectrometer_options *o, const struct vendor_file *file,
+                         struct jaz_light *out, struct error *err)
+{
+    struct vendor_file reference;
+    if (!vendor_file_load(o->reference, &reference, err))
+        return false;
+    const struct jaz_worth worth = {.reference = &reference,
+                                    .reference_scale = factor((enum file_unit)o->file_unit)};
+    bool fine = jaz_irradiance(file, &worth, o->boxcar, out, err);
+    vendor_file_fini(&reference);
+    return fine;
+}
+
+static bool process(const struct spectrometer_options *o, const struct vendor_file *file,
+                    struct jaz_light *out, struct error *err)
+{
+    bool counts = file->format == VENDOR_JAZ;
+    *out = (struct jaz_light){.peak = 0};
+    if (counts && *o->calibration)
+        return by_calibration(o, file, out, err);
+    if (counts && *o->reference)
+        return by_reference(o, file, out, err);
+    if (counts && jaz_is_ratio(file))
+        return fail(err, ERROR_CONFIG,
+                    "%s: its processed column is per cent of its reference, no irradiance: say "
+                    "whose light that was (reference), or give the unit's calibration",
+                    file->path);
+    return replay_irradiance(file, (enum file_unit)o->file_unit, &out->irradiance, err);
+}
+
 // What no longer reads leaves the last good one in place.
 static bool load(struct spectrometer *s, struct error *err)
 {
     struct stat now;
     struct vendor_file file;
-    struct spectrum irradiance;
+    struct jaz_light light;
     if (!look(s, &now, err) || !vendor_file_load(s->options.file, &file, err))
         return false;
-    if (!replay_irradiance(&file, (enum file_unit)s->options.file_unit, &irradiance, err)) {
+    if (!process(&s->options, &file, &light, err)) {
         vendor_file_fini(&file);
         return false;
     }
     vendor_file_fini(&s->file);
     s->file = file;
-    s->irradiance = irradiance;
+    s->light = light;
     s->changed = now.st_mtim;
     s->size = now.st_size;
     return true;
@@ -134,10 +176,12 @@ static bool replay_read(struct spectrometer *s, int64_t deadline_ns, struct spec
     int64_t now_ns = clock_now_ns();
     memset(out, 0, sizeof *out);
     out->taken = (struct interval){now_ns - lasted_ns(&s->file), now_ns};
-    out->status = SPECTROMETER_GOOD;
+    out->status = s->light.saturated ? SPECTROMETER_SATURATED : SPECTROMETER_GOOD;
     out->integration_us = s->file.integration_us;
     out->averaged = s->file.averaged > 0 ? s->file.averaged : 1;
-    out->irradiance = s->irradiance;
+    out->peak = s->light.peak;
+    out->irradiance = s->light.irradiance;
+    out->sigma = s->light.sigma;
     return true;
 }
 

@@ -53,6 +53,9 @@ const struct setting spectrometer_settings[] = {
      .help = "Driver replay: file of OceanView, SpectraSuite, Jaz, a .sp or \"nm, value\"."},
     {"file_unit", SETTING_ENUM, FIELD(file_unit), .unit = "", .choices = unit_names,
      .preset = "uW/cm2/nm", .help = "Driver replay: unit of the file's values."},
+    {"reference", SETTING_TEXT, FIELD(reference), SIZE(reference), .unit = "", .preset = "",
+     .help = "Driver replay: file of the irradiance behind the reference column of a Jaz file, in "
+             "file_unit; its raw counts then count, as they do with a calibration."},
     {0},
 };
 

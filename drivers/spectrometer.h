@@ -32,7 +32,7 @@ struct spectrum_sample {
     // W m-2 nm-1 on the inner grid; 0 where the instrument does not reach.
     struct spectrum irradiance;
     // Standard uncertainty of it (shot, read, dark, calibration), same unit; all
-    // 0 where none is known (replay).
+    // 0 where none is known (replay of finished values).
     struct spectrum sigma;
 };
 
@@ -66,6 +66,7 @@ struct spectrometer_options {
     double wavelength_nm[4]; // coefficients over the pixel in place of the unit's own; all 0: those
     char file[512];          // replay: the file
     int file_unit;           // replay: an enum file_unit
+    char reference[512];     // replay: file of the light behind a Jaz file's reference column
 };
 
 extern const struct setting spectrometer_settings[];

@@ -39,6 +39,7 @@ void vendor_file_fini(struct vendor_file *file)
     free(file->nm);
     free(file->values);
     free(file->dark);
+    free(file->reference);
     free(file->sample);
     *file = (struct vendor_file){0};
 }
@@ -162,8 +163,8 @@ static bool header_line(struct text *t)
 static bool make_room(struct text *t, size_t room)
 {
     struct vendor_file *out = t->out;
-    double **columns[] = {&out->nm, &out->values, &out->dark, &out->sample};
-    int count = out->format == VENDOR_JAZ ? 4 : 2;
+    double **columns[] = {&out->nm, &out->values, &out->dark, &out->reference, &out->sample};
+    int count = out->format == VENDOR_JAZ ? 5 : 2;
     if (room > PIXELS_MOST)
         return bad(t, "is one row too many");
     for (int i = 0; i < count; i++) {
@@ -219,6 +220,7 @@ static bool take_row(struct text *t, size_t *room)
     out->values[out->count] = cells[jaz ? 4 : 1];
     if (jaz) {
         out->dark[out->count] = cells[1];
+        out->reference[out->count] = cells[2];
         out->sample[out->count] = cells[3];
     }
     out->count++;

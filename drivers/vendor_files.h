@@ -35,9 +35,9 @@ struct vendor_file {
     size_t count;       // >= 2
     double *nm;         // [count] strictly ascending
     double
-        *values;  // [count] processed; of a unit that no such file tells (.sp divided by its norm)
-    double *dark; // [count] counts, Jaz only, else NULL
-    double *sample; // [count] counts, Jaz only, else NULL
+        *values; // [count] processed; of a unit that no such file tells (.sp divided by its norm)
+    // Counts of a Jaz file, [count] each; NULL in others.
+    double *dark, *reference, *sample;
 };
 
 // Accepts a zeroed one.
