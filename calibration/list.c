@@ -97,12 +97,6 @@ static void name(struct found *f, const struct instrument_identity *who)
     f->emulated = who->emulated;
 }
 
-static void blame(struct found *f, const struct error *err)
-{
-    f->access = err->code == ERROR_SYSTEM ? FOUND_IN_USE : FOUND_FAULTY;
-    found_text(f->note, sizeof f->note, err->text);
-}
-
 // Opens the instrument that the settings say hangs on a line, and lets it tell
 // its name. elsewhere is the place of one without a port; NULL: it was found already.
 #define ASK(kind, elsewhere)                                                                       \
@@ -120,7 +114,7 @@ static void blame(struct found *f, const struct error *err)
         struct kind *device =                                                                      \
             driver->open(&booth->kind.options, clock_now_ns() + ASK_WITHIN_NS, &err);              \
         if (!device) {                                                                             \
-            blame(f, &err);                                                                        \
+            found_blame(f, &err);                                                                  \
             return;                                                                                \
         }                                                                                          \
         driver->identify(device, &who);                                                            \

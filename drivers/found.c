@@ -2,6 +2,7 @@
 #include "drivers/found.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <hidapi.h>
 #include <libudev.h>
 #include <stdio.h>
@@ -45,12 +46,33 @@ struct found *found_add(struct found_list *list, const char *kind, const char *d
     snprintf(f->kind, sizeof f->kind, "%s", kind);
     snprintf(f->driver, sizeof f->driver, "%s", driver);
     snprintf(f->place, sizeof f->place, "%s", place);
-    if (access(place, R_OK | W_OK) != 0 && (errno == EACCES || errno == EPERM)) {
-        f->access = FOUND_REFUSED;
-        snprintf(f->note, sizeof f->note, "no permission; install the udev rules %s",
-                 UDEV_RULES_FILE);
-    }
+    if (access(place, R_OK | W_OK) != 0 && (errno == EACCES || errno == EPERM))
+        found_refuse(f);
     return f;
+}
+
+void found_refuse(struct found *f)
+{
+    f->access = FOUND_REFUSED;
+    snprintf(f->note, sizeof f->note, "no permission; install the udev rules %s", UDEV_RULES_FILE);
+}
+
+void found_blame(struct found *f, const struct error *err)
+{
+    f->access = udev_refused(err)           ? FOUND_REFUSED
+                : err->code == ERROR_SYSTEM ? FOUND_IN_USE
+                                            : FOUND_FAULTY;
+    found_text(f->note, sizeof f->note, err->text);
+}
+
+// Opening a hidraw node does nothing to the device, and says more than its mode.
+static void try_to_open(struct found *f)
+{
+    int fd = open(f->place, O_RDWR | O_NONBLOCK | O_CLOEXEC);
+    if (fd >= 0)
+        close(fd);
+    else if (errno == EACCES || errno == EPERM)
+        found_refuse(f);
 }
 
 static void narrow(char *out, size_t size, const wchar_t *wide)
@@ -78,6 +100,7 @@ void found_trackers(struct found_list *list)
                 snprintf(f->firmware, sizeof f->firmware, "%x.%02x", info->release_number >> 8,
                          info->release_number & 255);
             f->emulated = !strncmp(f->serial, "EMU", 3);
+            try_to_open(f);
         }
         hid_free_enumeration(all);
     }

@@ -58,6 +58,13 @@ void found_all(struct found_list *list, int64_t deadline_ns);
 struct found *found_add(struct found_list *list, const char *kind, const char *driver,
                         const char *place);
 
+// Access is refused, and the note names the udev rules.
+void found_refuse(struct found *found);
+
+// Why it could not be opened: refused when the error names the udev rules, in
+// use when the system said no otherwise, else faulty; the note is its text.
+void found_blame(struct found *found, const struct error *err);
+
 // Copies at most size - 1 characters, '?' for anything but printable ASCII,
 // without blanks at either end. text may be NULL.
 void found_text(char *out, size_t size, const char *text);

@@ -47,10 +47,8 @@ static void describe(struct found *f, int index, int64_t deadline_ns)
     if (f->access == FOUND_REFUSED)
         return;
     struct ocean_usb *usb = ocean_usb_open(index, &err);
-    if (!usb || !ask(usb, f, deadline_ns, &err)) {
-        f->access = !usb && err.code == ERROR_SYSTEM ? FOUND_IN_USE : FOUND_FAULTY;
-        found_text(f->note, sizeof f->note, err.text);
-    }
+    if (!usb || !ask(usb, f, deadline_ns, &err))
+        found_blame(f, &err);
     ocean_usb_close(usb);
 }
 

@@ -12,6 +12,7 @@
 #include "drivers/deadline.h"
 #include "drivers/found.h"
 #include "drivers/modbus_map.h"
+#include "drivers/udev.h"
 
 enum {
     AXES = 3,
@@ -128,6 +129,18 @@ static bool read_number(const struct iio_channel *channel, const char *attribute
     return true;
 }
 
+static bool fail_read(const struct accelerometer *a, const struct iio_channel *channel,
+                      enum error_code code, struct error *err)
+{
+    if (errno == EACCES || errno == EPERM)
+        return fail(err, ERROR_SYSTEM,
+                    "%s: no permission to read %s; install the udev rules " UDEV_RULES_FILE
+                    " (boothcal list --udev)",
+                    name_of(a->device), iio_channel_get_id(channel));
+    return fail(err, code, "%s: %s: %s", name_of(a->device), iio_channel_get_id(channel),
+                strerror(errno));
+}
+
 static bool set_up_axis(struct accelerometer *a, int which, struct error *err)
 {
     struct axis *axis = &a->axes[which];
@@ -142,8 +155,7 @@ static bool set_up_axis(struct accelerometer *a, int which, struct error *err)
     if (!read_number(channel, "scale", &axis->scale) ||
         (iio_channel_find_attr(channel, "offset") &&
          !read_number(channel, "offset", &axis->offset)))
-        return fail_errno(err, "%s: scale or offset of %s", name_of(a->device),
-                          iio_channel_get_id(channel));
+        return fail_read(a, channel, ERROR_SYSTEM, err) || while_doing(err, "scale or offset");
     return true;
 }
 
@@ -222,8 +234,7 @@ static bool read_axes(struct accelerometer *a, double out[AXES], struct error *e
         if (!read_number(axis->channel, axis->attribute, &out[i])) {
             bool gone = errno == ENODEV || errno == ENOENT || errno == ENXIO;
             gone = ++a->failures >= MOST_FAILURES || gone;
-            return fail(err, gone ? ERROR_GONE : ERROR_RETRY, "%s: %s: %s", name_of(a->device),
-                        iio_channel_get_id(axis->channel), strerror(errno));
+            return fail_read(a, axis->channel, gone ? ERROR_GONE : ERROR_RETRY, err);
         }
         out[i] = (out[i] + axis->offset) * axis->scale;
     }
@@ -274,6 +285,15 @@ static void iio_identify(const struct accelerometer *a, struct instrument_identi
     out->emulated = is_emulated(a->device);
 }
 
+static bool readable(const struct iio_device *device, const char *place)
+{
+    const struct iio_channel *channel = channel_of(device, 0);
+    const char *attribute = iio_channel_find_attr(channel, "input") ? "input" : "raw";
+    char path[192];
+    snprintf(path, sizeof path, "%s/%s", place, iio_channel_attr_get_filename(channel, attribute));
+    return access(path, R_OK) == 0 || (errno != EACCES && errno != EPERM);
+}
+
 void found_iio(struct found_list *list)
 {
     struct iio_context *context = iio_create_local_context();
@@ -288,10 +308,10 @@ void found_iio(struct found_list *list)
         found_text(f->model, sizeof f->model, name_of(device));
         found_text(f->serial, sizeof f->serial, label_of(device));
         f->emulated = is_emulated(device);
-        if (access(place, R_OK | X_OK) == 0) { // its files are only read
-            f->access = FOUND_USABLE;
-            *f->note = 0;
-        }
+        f->access = FOUND_USABLE; // its files are only read, so not as found_add judged
+        *f->note = 0;
+        if (!readable(device, place))
+            found_refuse(f);
     }
     if (context)
         iio_context_destroy(context);

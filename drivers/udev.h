@@ -5,6 +5,8 @@
 
 #include <stdio.h>
 
+#include "base/error.h"
+
 // Where the printed rules belong: before 73-seat-late.rules, or uaccess has no
 // effect. Error texts on refused permission name this file.
 #define UDEV_RULES_FILE "70-boothd.rules"
@@ -22,6 +24,9 @@ struct device_id {
     const char *name;
 };
 
+// Whether an error says that permission is refused and names the rules.
+bool udev_refused(const struct error *err);
+
 extern const struct device_id ocean_ids[];
 extern const struct device_id wiimote_ids[];
 extern const struct device_id witmotion_ids[];
@@ -29,7 +34,8 @@ extern const struct device_id witmotion_ids[];
 // Prints the rules file for every id of every driver. They match "add" and
 // "bind" (a rule for "add" alone is not applied at boot, python-seabreeze #22,
 // #66, #300). Serial adapters keep their group and only gain uaccess, since
-// other things hang on the same chips.
+// other things hang on the same chips. The kernel's accelerometers are files of
+// sysfs, which no MODE reaches: their rule opens them to the group.
 void udev_rules_print(FILE *out);
 
 #endif

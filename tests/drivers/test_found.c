@@ -16,6 +16,7 @@
 #include "drivers/found.h"
 
 #include <cmocka.h>
+#undef fail // ours is a function
 
 enum { NOBODY = 65534 };
 
@@ -72,6 +73,23 @@ static void a_node_that_may_not_be_opened_is_refused_and_the_rules_are_named(voi
     assert_int_equal(WEXITSTATUS(status), 0);
 }
 
+static void an_error_tells_refused_from_in_use_and_faulty(void **state)
+{
+    (void)state;
+    struct found f = {.access = FOUND_USABLE};
+    struct error err = {0};
+    fail(&err, ERROR_SYSTEM, "/dev/ttyUSB0: no permission; install the udev rules 70-boothd.rules");
+    found_blame(&f, &err);
+    assert_int_equal(f.access, FOUND_REFUSED);
+    assert_string_equal(f.note, err.text);
+    fail(&err, ERROR_SYSTEM, "/dev/ttyUSB0: another program uses the line");
+    found_blame(&f, &err);
+    assert_int_equal(f.access, FOUND_IN_USE);
+    fail(&err, ERROR_GONE, "no answer");
+    found_blame(&f, &err);
+    assert_int_equal(f.access, FOUND_FAULTY);
+}
+
 static void every_access_has_a_name(void **state)
 {
     (void)state;
@@ -98,6 +116,7 @@ int main(void)
         cmocka_unit_test(texts_of_devices_become_printable),
         cmocka_unit_test(a_list_that_is_full_takes_no_more),
         cmocka_unit_test(a_node_that_may_not_be_opened_is_refused_and_the_rules_are_named),
+        cmocka_unit_test(an_error_tells_refused_from_in_use_and_faulty),
         cmocka_unit_test(every_access_has_a_name),
         cmocka_unit_test(what_is_plugged_in_here_has_a_kind_and_a_place),
     };

@@ -8,10 +8,12 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include "drivers/found.h"
 #include "drivers/iio.h"
+#include "drivers/udev.h"
 
 #include <cmocka.h>
 
@@ -19,7 +21,7 @@
 #include "tests/fakes/near.h"
 
 static const double arithmetic = 1e-9;
-enum { BUDGET_MS = 2000 };
+enum { BUDGET_MS = 2000, NOBODY = 65534 };
 
 #define DEVICE "sys/devices/iio:device%d/%s"
 
@@ -230,6 +232,45 @@ static void accelerometers_are_listed_and_magnetometers_are_not(void **state)
     }
 }
 
+// Root may read everything, so the question is asked as nobody.
+static void files_that_may_not_be_read_are_refused_and_the_rules_are_named(void **state)
+{
+    (void)state;
+    char raw[128], scale[128];
+    snprintf(raw, sizeof raw, "%s/" DEVICE, root.path, 1, "in_accel_x_raw");
+    snprintf(scale, sizeof scale, "%s/" DEVICE, root.path, 2, "in_accel_x_scale");
+    assert_int_equal(chmod(root.path, 0755), 0);
+    assert_int_equal(chmod(raw, 0), 0);
+    assert_int_equal(chmod(scale, 0), 0);
+    fflush(NULL);
+    pid_t child = fork();
+    if (child == 0) {
+        struct found_list list = {0};
+        struct error open_err = {0}, read_err = {0};
+        struct tilt_sample s;
+        if (getuid() == 0 && setuid(NOBODY) != 0)
+            _exit(77);
+        found_iio(&list);
+        struct accelerometer *one = open_named("mma8452", &open_err);
+        bool none = !open_named("lis3dh", &open_err);
+        bool read = one && read_one(one, &s, &read_err);
+        iio_driver.close(one);
+        _exit(!(list.count == 2 && list.of[0].access == FOUND_REFUSED &&
+                strstr(list.of[0].note, UDEV_RULES_FILE) && list.of[1].access == FOUND_USABLE &&
+                one && !read && udev_refused(&read_err) && none && udev_refused(&open_err)));
+    }
+    int status = -1;
+    assert_int_equal(waitpid(child, &status, 0), child);
+    chmod(raw, 0644);
+    chmod(scale, 0644);
+    assert_true(WIFEXITED(status));
+    if (WEXITSTATUS(status) == 77) {
+        print_message("skipped: this system gives no other user to ask as\n");
+        return;
+    }
+    assert_int_equal(WEXITSTATUS(status), 0);
+}
+
 int main(int argc, char **argv)
 {
     (void)argc;
@@ -241,6 +282,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(garbage_costs_a_reading_and_absence_is_gone),
         cmocka_unit_test(a_matrix_that_is_none_is_refused),
         cmocka_unit_test(accelerometers_are_listed_and_magnetometers_are_not),
+        cmocka_unit_test(files_that_may_not_be_read_are_refused_and_the_rules_are_named),
     };
     const char *preload = getenv("LD_PRELOAD");
     if (!preload || !strstr(preload, "umockdev")) {

@@ -36,6 +36,7 @@ static void every_instrument_has_its_rule(void **state)
     assert_non_null(strstr(text, "KERNELS==\"0005:057E:0306.*\""));
     assert_non_null(strstr(text, "KERNELS==\"0005:057E:0330.*\""));
     assert_non_null(strstr(text, "ATTRS{idVendor}==\"1a86\""));
+    assert_non_null(strstr(text, "SUBSYSTEM==\"iio\""));
     free(text);
 }
 
