@@ -5,156 +5,14 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #include "calibration/commands.h"
 #include "calibration/display_fit.h"
+#include "calibration/display_fitting.h"
 #include "calibration/display_measure.h"
 #include "calibration/lines.h"
 #include "calibration/view_measure.h"
 #include "config/display_file.h"
-
-// ---- fit -------------------------------------------------------------------
-
-static void warn_misfit(const struct display_fit *f)
-{
-    fprintf(
-        stderr,
-        "boothcal: warning: three curves and a matrix do not describe this panel: mean %.2f, 95th "
-        "percentile %.2f CIEDE2000",
-        f->de00.mean, f->de00.p95);
-    if (f->primaries && fabs(f->additivity) > 0.02)
-        fprintf(stderr,
-                ": its channels do not add (red, green and blue alone sum to %+.1f %% of white's "
-                "luminance)",
-                100 * f->additivity);
-    else if (f->drifted)
-        fprintf(stderr, ": it changed while it was measured");
-    else
-        fprintf(stderr,
-                ": colours of the channels change along their ramps, or the readings are noisy");
-    fputc('\n', stderr);
-}
-
-// Whether the file's white was warned about.
-static bool warn_white(const struct measurements *m)
-{
-    bool wrong = m->white_error > WHITE_ERROR_WARN;
-    if (wrong)
-        fprintf(stderr,
-                "boothcal: warning: %s: the patch 100 100 100 is %.1f %% from %s (sound below %g "
-                "%%)\n",
-                m->path, 100 * m->white_error, m->absolute ? "LUMINANCE_XYZ_CDM2" : "Y = 100",
-                100 * WHITE_ERROR_WARN);
-    return wrong;
-}
-
-static int warn(const struct measurements *m, const struct display_model *model,
-                const struct display_fit *f)
-{
-    bool wrong_white = warn_white(m);
-    if (f->disordered)
-        fprintf(stderr,
-                "boothcal: warning: %s: red's x, green's Y or blue's Z is not the largest of the "
-                "three primaries: are columns of RGB or XYZ exchanged?\n",
-                m->path);
-    if (f->misfit)
-        warn_misfit(f);
-    if (f->ill_conditioned)
-        fprintf(stderr,
-                "boothcal: warning: primaries are much alike (condition number %.1f, sound below "
-                "10): errors grow by that factor\n",
-                model->condition);
-    if (f->drifted)
-        fprintf(stderr,
-                "boothcal: warning: %s: white drifted by %.1f %% over %d readings (sound below "
-                "3 %%): warm the panel up and measure again\n",
-                m->path, 100 * m->white_drift, m->whites);
-    if (!m->absolute)
-        fprintf(stderr,
-                "boothcal: warning: %s: no LUMINANCE_XYZ_CDM2: white is taken as %.5g cd/m2\n",
-                m->path, m->white.Y);
-    bool any = wrong_white || f->disordered || f->misfit || f->ill_conditioned || f->drifted ||
-               !m->absolute;
-    return any ? COMMAND_WARNED : COMMAND_FINE;
-}
-
-static void print_fit(const struct measurements *m, const struct display_model *model,
-                      const struct display_fit *f)
-{
-    struct xyz black = display_black(model);
-    printf("%s: %d patches, CIEDE2000 mean %.3f, median %.3f, 95th percentile %.3f, largest %.3f\n",
-           m->path, f->patches, f->de00.mean, f->de00.median, f->de00.p95, f->de00.max);
-    printf(
-        "white %.5g cd/m2, black %.3g cd/m2, condition number %.2f, %d of %d curve nodes pooled\n",
-        m->white.Y, black.Y, model->condition, f->pooled, 3 * DISPLAY_NODES);
-}
-
-static struct display_origin origin_of(const struct measurements *m, const struct display_fit *f)
-{
-    struct display_origin o = {
-        .patches = f->patches, .fit_mean_de00 = f->de00.mean, .fit_max_de00 = f->de00.max};
-    snprintf(o.instrument, sizeof o.instrument, "%s", m->instrument);
-    snprintf(o.date, sizeof o.date, "%s", m->created);
-    snprintf(o.software, sizeof o.software, "boothcal %s", BOOTHD_VERSION);
-    snprintf(o.source, sizeof o.source, "%s", m->path);
-    return o;
-}
-
-static int fit_to(const char *out, const struct measurements *m)
-{
-    struct error err;
-    struct display_fit found;
-    struct display_model *model = malloc(sizeof *model);
-    int code = COMMAND_FAILED;
-    if (!model)
-        fprintf(stderr, "boothcal: out of memory\n");
-    else if (!display_fit(m, model, &found, &err))
-        code = command_bad_input(&err);
-    else {
-        struct display_origin origin = origin_of(m, &found);
-        if (!display_save(out, model, &origin, &err))
-            code = command_failed(&err);
-        else {
-            print_fit(m, model, &found);
-            code = warn(m, model, &found);
-        }
-    }
-    free(model);
-    return code;
-}
-
-static bool same_file(const char *a, const char *b)
-{
-    struct stat x, y;
-    return !stat(a, &x) && !stat(b, &y) && x.st_dev == y.st_dev && x.st_ino == y.st_ino;
-}
-
-static int command_fit(int argc, char **argv)
-{
-    const char *in = NULL;
-    const char *out = NULL;
-    for (int i = 1; i < argc; i++) {
-        if (!strcmp(argv[i], "-o") && i + 1 < argc)
-            out = argv[++i];
-        else if (argv[i][0] != '-' && !in)
-            in = argv[i];
-        else
-            in = out = "";
-    }
-    if (!in || !out || !*in || !*out)
-        return command_bad_usage("usage: boothcal display fit TRAIN.ti3 -o D.ini");
-    if (same_file(in, out))
-        return command_bad_usage("boothcal display fit: -o %s would overwrite the measurements",
-                                 out);
-    struct error err;
-    struct measurements m = {0};
-    if (!measurements_load(in, &m, &err))
-        return command_bad_input(&err);
-    int code = fit_to(out, &m);
-    measurements_fini(&m);
-    return code;
-}
 
 // ---- check -----------------------------------------------------------------
 
@@ -188,10 +46,8 @@ static bool differences(const struct measurements *m, const struct display_model
 // Measurements that do not say how many cd/m2: the model's white is made theirs.
 static void make_relative(struct display_model *model, const struct measurements *m)
 {
-    double k = m->white.Y / display_forward(model, (struct counts){1, 1, 1}).Y;
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 4; j++)
-            model->matrix[i][j] *= k;
+    double Y = display_forward(model, (struct counts){1, 1, 1}).Y;
+    display_model_scale(model, m->white.Y / Y);
     fprintf(stderr,
             "boothcal: warning: %s: no LUMINANCE_XYZ_CDM2: the model is compared at the white of "
             "these measurements\n",
@@ -206,7 +62,7 @@ static int check(const char *model_path, const char *ti3, struct summary *s, str
     if (!model)
         fail(err, ERROR_SYSTEM, "out of memory");
     else if (display_load(model_path, model, NULL, err) && measurements_load(ti3, &m, err)) {
-        bool wrong_white = warn_white(&m);
+        bool wrong_white = display_warn_white(&m);
         if (!m.absolute)
             make_relative(model, &m);
         if (differences(&m, model, s, err))
@@ -371,15 +227,21 @@ int command_display(int argc, char **argv)
          "  --help\n"
          "\n"
          "Exit 3: done, with a warning (white is left more than 1 CIEDE2000 off in some direction)."},
-        {"fit", command_fit, "TRAIN.ti3 -o D.ini",
-         "Fits three curves and a 3x4 matrix to measured patches.\n"
+        {"fit", display_fitting, "TRAIN.ti3 -o D.ini [--model KIND] [--json]",
+         "Fits a display model to measured patches.\n"
          "\n"
-         "  TRAIN.ti3  RGB_R RGB_G RGB_B (0..100) and XYZ_X XYZ_Y XYZ_Z of at least 20 patches\n"
-         "  -o D.ini   where the model goes\n"
+         "  TRAIN.ti3     RGB_R RGB_G RGB_B (0..100) and XYZ_X XYZ_Y XYZ_Z of at least 20 patches\n"
+         "  -o, --out D.ini  where the model goes\n"
+         "  --model KIND  day: three curves and a 3x4 matrix; interaction: and channels that\n"
+         "                disturb each other; residual: and a smooth residual over the predicted\n"
+         "                colour; auto (default): the simplest that is not significantly worse\n"
+         "                than the best in cross-validation\n"
+         "  --json        what was found as one JSON object\n"
          "  --help\n"
          "\n"
-         "Exit 3: done, with a warning (primaries much alike or exchanged, the panel is no such\n"
-         "model, white drifted or contradicts LUMINANCE_XYZ_CDM2, no absolute white)."},
+         "Exit 3: done, with a warning (primaries much alike or exchanged, a matrix does not\n"
+         "describe the panel, white drifted by more than 3 % or contradicts\n"
+         "LUMINANCE_XYZ_CDM2, no absolute white)."},
         {"check", command_check, "D.ini TEST.ti3 [--json]",
          "CIEDE2000 of a model against measured patches: mean, median, p95, max, n.\n"
          "\n"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Nonlinear least squares through Ceres: the one door to it. Plain data in and
-// out; no exception leaves.
+// Nonlinear least squares through Ceres, and linear ones through its Eigen: the
+// one door to both. Plain data in and out; no exception leaves.
 #ifndef CALIBRATION_FIT_CERES_H
 #define CALIBRATION_FIT_CERES_H
 
@@ -38,6 +38,38 @@ struct least_squares_result {
 // failure (DATA) that says what the solver said.
 bool least_squares_solve(const struct least_squares *problem, double *x,
                          struct least_squares_result *result, struct error *err);
+
+// Covariance of the parameters at x, of residuals with unit variance:
+// (J'J)^-1, without the robust loss, row-major parameters x parameters. Its
+// scale is the caller's. DATA when the residuals do not decide every parameter.
+bool least_squares_covariance(const struct least_squares *problem, const double *x,
+                              double *covariance, struct error *err);
+
+// Linear least squares with a penalty, several values at a time:
+// sum of weight |value - design c|^2 + penalty |c|^2 is least.
+// Source: Hoerl, Kennard 1970 (Technometrics 12, 55-67).
+struct ridge_problem {
+    int rows, unknowns, values; // each >= 1
+    const double *design;       // rows x unknowns
+    const double *value;        // rows x values
+    const double *weight;       // rows, > 0
+};
+
+struct ridge;
+
+// Decomposes once, for any penalty > 0. NULL on failure.
+struct ridge *ridge_create(const struct ridge_problem *problem, struct error *err);
+void ridge_destroy(struct ridge *ridge); // accepts NULL
+
+// c: unknowns x values.
+void ridge_solve(const struct ridge *ridge, double penalty, double *c);
+
+// Each row as the other rows alone predict it, rows x values, in closed form
+// (Allen 1974, Technometrics 16, 125-127).
+void ridge_left_out(const struct ridge *ridge, double penalty, double *predicted);
+
+// How many unknowns the rows decide: the trace of the hat matrix.
+double ridge_freedom(const struct ridge *ridge, double penalty);
 
 #ifdef __cplusplus
 }

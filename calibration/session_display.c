@@ -62,7 +62,7 @@ static bool fit_model(struct session *s, const char *verify_path, struct error *
     struct display_fit found;
     if (!measurements_load(d->measurements, &m, err))
         return false;
-    bool fine = display_fit(&m, &model, &found, err) && check(d, &model, verify_path, err);
+    bool fine = display_fit(&m, NULL, &model, &found, err) && check(d, &model, verify_path, err);
     struct display_origin origin = {.patches = m.count};
     snprintf(origin.instrument, sizeof origin.instrument, "%s", m.instrument);
     snprintf(origin.source, sizeof origin.source, "%s", d->measurements);

@@ -186,6 +186,19 @@ bool display_model_prepare(struct display_model *model, struct error *err)
     return addition_prepare(model, err);
 }
 
+void display_model_scale(struct display_model *model, double k)
+{
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 4; j++)
+            model->matrix[i][j] *= k;
+        for (int j = 0; j < 3; j++)
+            model->inverse[i][j] /= k;
+        for (int t = 0; t < DISPLAY_TERMS; t++)
+            model->interaction[i][t] *= k;
+    }
+    model->white = (struct xyz){k * model->white.X, k * model->white.Y, k * model->white.Z};
+}
+
 struct pool {
     double sum;
     int count;

@@ -89,6 +89,10 @@ bool display_model_prepare(struct display_model *model, struct error *err);
 #define DISPLAY_FOLD_MOST 0.9
 double display_fold(const struct display_model *model);
 
+// Makes a prepared model emit k > 0 times as much light, black too; it stays
+// prepared.
+void display_model_scale(struct display_model *model, double k);
+
 // Makes three curves strictly increasing: pool adjacent violators, then a
 // least slope of 1e-6 of full scale per node, ends pinned to 0 and 1. Returns
 // the number of pooled nodes.

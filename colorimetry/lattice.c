@@ -75,30 +75,25 @@ struct vec3 lattice_at(const struct lattice *l, struct vec3 at, struct mat3 *slo
     return sum(l, p.first, p.weight[0], p.weight[1], p.weight[2]);
 }
 
-// Largest change of a value from a coefficient to the next along an axis.
-static double change_most(const struct lattice *l, int axis, int value)
-{
-    static const int stride[3] = {LATTICE_SIDE * LATTICE_SIDE, LATTICE_SIDE, 1};
-    double most = 0;
-    for (int k = 0; k < LATTICE_NODES; k++) {
-        if (k / stride[axis] % LATTICE_SIDE == LATTICE_SIDE - 1)
-            continue;
-        double change = fabs(l->node[k + stride[axis]][value] - l->node[k][value]);
-        if (!isfinite(change))
-            return INFINITY;
-        most = fmax(most, change);
-    }
-    return most;
-}
-
 double lattice_slope_most(const struct lattice *l)
 {
+    const int places = 4 * INTERVALS + 1;
+    const struct vec3 size = vec3_sub(l->most, l->least);
     double most = 0;
-    for (int value = 0; value < 3; value++) {
-        double sum = 0;
-        for (int axis = 0; axis < 3; axis++)
-            sum += change_most(l, axis, value) / spacing(l, axis);
-        most = fmax(most, sum);
+    for (int k = 0; k < places * places * places; k++) {
+        const double x = (double)(k / places / places) / (places - 1),
+                     y = (double)(k / places % places) / (places - 1),
+                     z = (double)(k % places) / (places - 1);
+        struct vec3 at = {l->least.x + x * size.x, l->least.y + y * size.y,
+                          l->least.z + z * size.z};
+        struct mat3 by;
+        lattice_at(l, at, &by);
+        for (int n = 0; n < 3; n++) {
+            double sum = fabs(by.m[n][0]) + fabs(by.m[n][1]) + fabs(by.m[n][2]);
+            if (!isfinite(sum))
+                return INFINITY;
+            most = fmax(most, sum);
+        }
     }
     return most;
 }

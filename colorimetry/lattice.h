@@ -37,9 +37,9 @@ struct lattice_place lattice_find(const struct lattice *lattice, struct vec3 at)
 // The value, and d value / d coordinate (row: value) when slopes is not NULL.
 struct vec3 lattice_at(const struct lattice *lattice, struct vec3 at, struct mat3 *slopes);
 
-// A bound on the sum of the absolute slopes of any value, anywhere: slopes of
-// B-splines are weighted means of the coefficients' differences (de Boor 1978,
-// X, eq. 15). Infinite when a coefficient is not finite.
+// The largest sum of the absolute slopes of any value, of 13 places a side:
+// four an interval, between which cubic splines hardly bend. Infinite when a
+// coefficient is not finite.
 double lattice_slope_most(const struct lattice *lattice);
 
 // Where coefficient i of an axis (0..2) has its weight: its Greville abscissa.

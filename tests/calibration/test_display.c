@@ -251,7 +251,7 @@ static void a_day_model_is_found_again(void **state)
     struct display_model model;
     struct display_fit found;
     struct error err = {0};
-    assert_true(display_fit(&m, &model, &found, &err));
+    assert_true(display_fit(&m, NULL, &model, &found, &err));
     assert_true(found.de00.mean < RECOVERED_DE00);
     assert_true(mean_on_new_colours(&model) < RECOVERED_DE00);
     assert_false(found.misfit || found.ill_conditioned || found.drifted);
@@ -266,7 +266,7 @@ static void noise_is_averaged_not_followed(void **state)
     struct measurements m = measured(0.02);
     struct display_model model;
     struct display_fit found;
-    assert_true(display_fit(&m, &model, &found, NULL));
+    assert_true(display_fit(&m, NULL, &model, &found, NULL));
     assert_true(mean_on_new_colours(&model) < NOISY_DE00);
     assert_true(mean_on_new_colours(&model) < found.de00.mean);
     measurements_fini(&m);
@@ -287,7 +287,7 @@ static void a_panel_whose_channels_do_not_add_is_a_misfit(void **state)
     m.white.X *= 0.75;
     m.white.Y *= 0.75;
     m.white.Z *= 0.75;
-    assert_true(display_fit(&m, &model, &found, NULL));
+    assert_true(display_fit(&m, NULL, &model, &found, NULL));
     assert_true(found.misfit);
     assert_near(found.additivity, 1 / 0.75 - 1, 0.01); // black counts a little
     measurements_fini(&m);
@@ -308,7 +308,7 @@ static void exchanged_columns_show_in_the_primaries(void **state)
                  : kind == 3 ? (struct xyz){v.X, v.Z, v.Y}
                              : v;
         }
-        assert_true(display_fit(&m, &model, &found, &err));
+        assert_true(display_fit(&m, NULL, &model, &found, &err));
         assert_int_equal(found.disordered, kind != 0);
         measurements_fini(&m);
     }
@@ -327,7 +327,7 @@ static void values_of_other_patches_are_no_display(void **state)
         m.patches[i].xyz = m.patches[j].xyz;
         m.patches[j].xyz = swap;
     }
-    assert_false(display_fit(&m, &model, &found, &err));
+    assert_false(display_fit(&m, NULL, &model, &found, &err));
     assert_non_null(strstr(err.text, "belong to no display"));
     measurements_fini(&m);
 }
@@ -340,11 +340,11 @@ static void too_few_patches_decide_nothing(void **state)
     struct display_fit found;
     struct error err = {0};
     m.count = 12;
-    assert_false(display_fit(&m, &model, &found, &err));
+    assert_false(display_fit(&m, NULL, &model, &found, &err));
     assert_int_equal(err.code, ERROR_DATA);
     for (m.count = 0; m.count < 40;)
         add(&m, m.count % 2, m.count / 2 % 2, m.count / 4 % 2, 0);
-    assert_false(display_fit(&m, &model, &found, &err));
+    assert_false(display_fit(&m, NULL, &model, &found, &err));
     assert_non_null(strstr(err.text, "levels"));
     assert_near(model.condition, -1, 0);
     measurements_fini(&m);
@@ -379,7 +379,7 @@ static void real_panels_are_met_on_the_half_the_fit_never_saw(void **state)
         assert_true(measurements_load(path, &train, NULL));
         snprintf(path, sizeof path, "%s/%s.test.ti3", data, panels[i].name);
         assert_true(measurements_load(path, &test, NULL));
-        assert_true(display_fit(&train, &model, &found, NULL));
+        assert_true(display_fit(&train, NULL, &model, &found, NULL));
         assert_true(test.count < 1000 && display_differences(&test, &model, de00, NULL));
         assert_true(summarise(de00, test.count).mean <= panels[i].mean);
         measurements_fini(&train);

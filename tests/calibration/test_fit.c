@@ -6,6 +6,7 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "calibration/cholesky.h"
 #include "calibration/fit_ceres.h"
 
 #include <cmocka.h>
@@ -141,12 +142,148 @@ static void failures_leave_the_start_alone_and_say_why(void **state)
     assert_near(x[1], 1, 0);
 }
 
+static void certified_deviations_of_misra1a_follow_from_the_covariance(void **state)
+{
+    (void)state;
+    struct least_squares p = {
+        .parameters = 2, .groups = 14, .group_size = 1, .evaluate = misra, .iterations = 100};
+    double x[2] = {2.3894212918E+02, 5.5015643181};
+    double c[2][2];
+    struct error err = {0};
+    assert_true(least_squares_covariance(&p, x, c[0], &err));
+    const double deviation = 1.0187876330E-01; // of the residuals
+    assert_near(deviation * sqrt(c[0][0]) / 2.7070075241E+00, 1, CERTIFIED);
+    assert_near(deviation * sqrt(c[1][1]) * 1e-4 / 7.2668688436E-06, 1, CERTIFIED);
+    assert_near(c[0][1], c[1][0], 1e-9 * fabs(c[0][1]));
+}
+
+static bool only_the_sum(void *context, int group, const double *x, double *residuals,
+                         double *jacobian)
+{
+    (void)context;
+    residuals[0] = x[0] + x[1] - group;
+    if (jacobian)
+        jacobian[0] = jacobian[1] = 1;
+    return true;
+}
+
+static void what_residuals_do_not_decide_has_no_covariance(void **state)
+{
+    (void)state;
+    struct least_squares p = {
+        .parameters = 2, .groups = 5, .group_size = 1, .evaluate = only_the_sum, .iterations = 10};
+    double x[2] = {1, 1}, c[4];
+    struct error err = {0};
+    assert_false(least_squares_covariance(&p, x, c, &err));
+    assert_int_equal(err.code, ERROR_DATA);
+}
+
+// NIST StRD Norris: y = b0 + b1 x.
+static const double norris[36][2] = {
+    {0.1, 0.2},     {338.8, 337.4}, {118.1, 118.2}, {888.0, 884.6}, {9.2, 10.1},    {228.1, 226.5},
+    {668.5, 666.3}, {998.5, 996.3}, {449.1, 448.6}, {778.9, 777.0}, {559.2, 558.2}, {0.3, 0.4},
+    {0.1, 0.6},     {778.1, 775.5}, {668.8, 666.9}, {339.3, 338.0}, {448.9, 447.5}, {10.8, 11.6},
+    {557.7, 556.0}, {228.3, 228.1}, {998.0, 995.8}, {888.8, 887.6}, {119.6, 120.2}, {0.3, 0.3},
+    {0.6, 0.3},     {557.6, 556.8}, {339.3, 339.1}, {888.0, 887.2}, {998.5, 999.0}, {778.9, 779.0},
+    {10.2, 11.1},   {117.6, 118.3}, {228.9, 229.2}, {668.4, 669.1}, {449.2, 448.9}, {0.2, 0.5},
+};
+
+struct line_fit {
+    double design[36][2], value[36][1], weight[36];
+};
+
+static struct ridge *norris_without(int left_out, struct line_fit *l)
+{
+    int n = 0;
+    for (int i = 0; i < 36; i++) {
+        if (i == left_out)
+            continue;
+        l->design[n][0] = 1;
+        l->design[n][1] = norris[i][1];
+        l->value[n][0] = norris[i][0];
+        l->weight[n++] = 0.5 + 0.05 * i;
+    }
+    const struct ridge_problem p = {.rows = n,
+                                    .unknowns = 2,
+                                    .values = 1,
+                                    .design = l->design[0],
+                                    .value = l->value[0],
+                                    .weight = l->weight};
+    struct ridge *r = ridge_create(&p, NULL);
+    assert_non_null(r);
+    return r;
+}
+
+static void the_certified_line_through_norris_is_found(void **state)
+{
+    (void)state;
+    struct line_fit l;
+    double c[2];
+    ridge_destroy(norris_without(-1, &l));
+    for (int i = 0; i < 36; i++)
+        l.weight[i] = 1;
+    const struct ridge_problem p = {.rows = 36,
+                                    .unknowns = 2,
+                                    .values = 1,
+                                    .design = l.design[0],
+                                    .value = l.value[0],
+                                    .weight = l.weight};
+    struct ridge *r = ridge_create(&p, NULL);
+    assert_non_null(r);
+    ridge_solve(r, 1e-12, c);
+    assert_near(c[0], -0.262323073774029, CERTIFIED);
+    assert_near(c[1], 1.00211681802045, CERTIFIED);
+    assert_near(ridge_freedom(r, 1e-12), 2, CERTIFIED);
+    ridge_solve(r, 1e15, c);
+    assert_near(c[1], 0, CERTIFIED);
+    assert_near(ridge_freedom(r, 1e15), 0, CERTIFIED);
+    ridge_destroy(r);
+}
+
+static void rows_left_out_in_closed_form_are_rows_left_out(void **state)
+{
+    (void)state;
+    struct line_fit l, less;
+    double left_out[36], c[2];
+    struct ridge *whole = norris_without(-1, &l);
+    for (double penalty = 1e-3; penalty < 1e6; penalty *= 100) {
+        ridge_left_out(whole, penalty, left_out);
+        for (int i = 0; i < 36; i += 5) {
+            struct ridge *r = norris_without(i, &less);
+            ridge_solve(r, penalty, c);
+            assert_near(left_out[i], c[0] + c[1] * norris[i][1], CERTIFIED);
+            ridge_destroy(r);
+        }
+    }
+    ridge_destroy(whole);
+    ridge_destroy(NULL);
+}
+
+static void a_textbook_matrix_has_its_textbook_factor(void **state)
+{
+    (void)state;
+    double a[9] = {4, 99, 99, 12, 37, 99, -16, -43, 98};
+    const double factor[9] = {2, 0, 0, 6, 1, 0, -8, 5, 3};
+    assert_true(cholesky(a, 3));
+    for (int i = 0; i < 9; i++)
+        assert_near(a[i], factor[i], 1e-12);
+    double b[4] = {1, 0, 2, 1}; // eigenvalues -1 and 3
+    assert_false(cholesky(b, 2));
+    double none[1] = {NAN};
+    assert_false(cholesky(none, 1));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(certified_values_of_misra1a_are_found),
         cmocka_unit_test(numeric_derivatives_reach_the_valley_of_rosenbrock),
         cmocka_unit_test(an_outlier_pulls_less_with_a_robust_loss),
+        cmocka_unit_test(certified_deviations_of_misra1a_follow_from_the_covariance),
+        cmocka_unit_test(what_residuals_do_not_decide_has_no_covariance),
+        cmocka_unit_test(the_certified_line_through_norris_is_found),
+        cmocka_unit_test(rows_left_out_in_closed_form_are_rows_left_out),
+        cmocka_unit_test(a_textbook_matrix_has_its_textbook_factor),
         cmocka_unit_test(failures_leave_the_start_alone_and_say_why),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

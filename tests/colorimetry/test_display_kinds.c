@@ -55,7 +55,7 @@ static struct display_model interacting(void)
     return m;
 }
 
-// A residual as real panels have it: up to 3 units, changing over some 30.
+// A residual rougher than real panels have it: several units, changing over 30.
 static struct display_model corrected(void)
 {
     struct display_model m = day();
@@ -65,7 +65,7 @@ static struct display_model corrected(void)
     seed = 8;
     for (int k = 0; k < LATTICE_NODES; k++)
         for (int n = 0; n < 3; n++)
-            m.residual.node[k][n] = 3 * (2 * uniform() - 1);
+            m.residual.node[k][n] = 20 * (2 * uniform() - 1);
     assert_true(display_model_prepare(&m, NULL));
     return m;
 }
@@ -176,6 +176,24 @@ static void a_residual_of_one_unit_everywhere_moves_every_colour_by_that(void **
         assert_true(lab_of(display_forward(&m, c), m.white, &b, NULL));
         assert_near(delta_e_ab(a, b), 1, ARITHMETIC);
         assert_near(b.a - a.a, 1, ARITHMETIC);
+    }
+}
+
+static void twice_the_light_is_twice_every_colour_and_inverts_alike(void **state)
+{
+    (void)state;
+    struct display_model models[] = {day(), interacting(), corrected()};
+    for (int i = 0; i < 3; i++) {
+        struct display_model twice = models[i];
+        struct counts c = {0.3, 0.7, 0.1};
+        struct xyz once = display_forward(&models[i], c);
+        display_model_scale(&twice, 2);
+        struct xyz got = display_forward(&twice, c);
+        assert_near(got.X, 2 * once.X, ARITHMETIC);
+        assert_near(got.Z, 2 * once.Z, ARITHMETIC);
+        assert_near(display_invert(&twice, got).counts.g, c.g, ARITHMETIC);
+        assert_true(display_model_prepare(&twice, NULL));
+        assert_near(display_invert(&twice, got).counts.b, c.b, ARITHMETIC);
     }
 }
 
@@ -296,6 +314,7 @@ int main(void)
         cmocka_unit_test(channels_share_their_harmonic_mean),
         cmocka_unit_test(one_channel_alone_is_not_interacted_with),
         cmocka_unit_test(a_residual_of_one_unit_everywhere_moves_every_colour_by_that),
+        cmocka_unit_test(twice_the_light_is_twice_every_colour_and_inverts_alike),
         cmocka_unit_test(the_gamut_ends_where_counts_end),
         cmocka_unit_test(beyond_the_gamut_the_inverse_is_continuous),
         cmocka_unit_test(absurd_targets_stay_finite_and_flagged),

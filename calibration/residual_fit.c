@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calibration/residual_fit.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "calibration/cholesky.h"
+#include "calibration/fit_ceres.h"
+#include "calibration/statistics.h"
+#include "colorimetry/metric.h"
+
+static const double LENGTH = 160;         // CIELAB units over which the residual stays alike
+static const double PENALTY_LEAST = 1e-6; // and up by the half decade
+static const double HUBER = 1.5;          // times the median difference: counts by less beyond
+enum { PENALTIES = 19, ROUNDS = 2, SIDE = 9 };
+
+struct fit {
+    const struct measurements *m;
+    struct display_model *model;
+    struct lattice box;    // its corners
+    double *prior;         // LATTICE_NODES squared: factor of the prior covariance
+    double *design;        // patches x LATTICE_NODES, on the prior's factor
+    double (*apart)[3];    // measured less predicted, CIELAB
+    struct lab *measured;  // CIELAB
+    struct lab *predicted; // CIELAB
+    double *weight;
+    double (*left_out)[3];
+    double *de00;
+};
+
+static void drop(struct fit *f)
+{
+    free(f->prior);
+    free(f->design);
+    free(f->apart);
+    free(f->measured);
+    free(f->predicted);
+    free(f->weight);
+    free(f->left_out);
+    free(f->de00);
+}
+
+static bool take_room(struct fit *f, struct error *err)
+{
+    size_t n = (size_t)f->m->count;
+    f->prior = malloc(sizeof(double) * LATTICE_NODES * LATTICE_NODES);
+    f->design = malloc(n * LATTICE_NODES * sizeof *f->design);
+    f->apart = malloc(n * sizeof *f->apart);
+    f->measured = malloc(n * sizeof *f->measured);
+    f->predicted = malloc(n * sizeof *f->predicted);
+    f->weight = malloc(n * sizeof *f->weight);
+    f->left_out = malloc(n * sizeof *f->left_out);
+    f->de00 = malloc(n * sizeof *f->de00);
+    return (f->prior && f->design && f->apart && f->measured && f->predicted && f->weight &&
+            f->left_out && f->de00) ||
+           fail(err, ERROR_SYSTEM, "out of memory for %d patches", f->m->count);
+}
+
+static struct lab lab_in(const struct fit *f, struct xyz c)
+{
+    struct lab lab = {0, 0, 0};
+    lab_of(c, f->model->white, &lab, NULL); // prepare saw to white
+    return lab;
+}
+
+// The box is that of the plain model's gamut.
+static void find_box(struct fit *f)
+{
+    struct vec3 *least = &f->box.least, *most = &f->box.most;
+    *least = (struct vec3){INFINITY, INFINITY, INFINITY};
+    *most = vec3_scale(*least, -1);
+    for (int k = 0; k < SIDE * SIDE * SIDE; k++) {
+        const double step = 1.0 / (SIDE - 1);
+        struct counts c = {k / SIDE / SIDE * step, k / SIDE % SIDE * step, k % SIDE * step};
+        struct lab lab = lab_in(f, display_forward(f->model, c));
+        *least = (struct vec3){fmin(least->x, lab.L), fmin(least->y, lab.a), fmin(least->z, lab.b)};
+        *most = (struct vec3){fmax(most->x, lab.L), fmax(most->y, lab.a), fmax(most->z, lab.b)};
+    }
+}
+
+static double matern(double distance)
+{
+    double s = sqrt(5) * distance / LENGTH;
+    return (1 + s + s * s / 3) * exp(-s);
+}
+
+static struct vec3 node_place(const struct lattice *box, int node)
+{
+    return (struct vec3){lattice_abscissa(box, 0, node / LATTICE_SIDE / LATTICE_SIDE),
+                         lattice_abscissa(box, 1, node / LATTICE_SIDE % LATTICE_SIDE),
+                         lattice_abscissa(box, 2, node % LATTICE_SIDE)};
+}
+
+static bool find_prior(struct fit *f, struct error *err)
+{
+    const double jitter = 1e-9; // of the variance: keeps the factor regular
+    for (int i = 0; i < LATTICE_NODES; i++)
+        for (int j = 0; j <= i; j++) {
+            struct vec3 apart = vec3_sub(node_place(&f->box, i), node_place(&f->box, j));
+            f->prior[i * LATTICE_NODES + j] = matern(vec3_length(apart)) + (i == j ? jitter : 0);
+        }
+    return cholesky(f->prior, LATTICE_NODES) ||
+           fail(err, ERROR_DATA, "residual: no gamut to lay it over");
+}
+
+static void design_row(const struct fit *f, struct lab at, double *row)
+{
+    struct lattice_place p = lattice_find(&f->box, (struct vec3){at.L, at.a, at.b});
+    memset(row, 0, LATTICE_NODES * sizeof *row);
+    for (int i = 0; i < 4; i++)
+        for (int j = 0; j < 4; j++)
+            for (int k = 0; k < 4; k++) {
+                int node = lattice_node(p.first[0] + i, p.first[1] + j, p.first[2] + k);
+                double w = p.weight[0][i] * p.weight[1][j] * p.weight[2][k];
+                for (int n = 0; n <= node; n++)
+                    row[n] += w * f->prior[node * LATTICE_NODES + n];
+            }
+}
+
+// The side of a cube of CIELAB as large as one unit of CIEDE2000, inverted.
+static double scale_of(struct lab at)
+{
+    struct mat3 u = de00_metric(at); // triangular
+    return cbrt(u.m[0][0] * u.m[1][1] * u.m[2][2]);
+}
+
+static void find_rows(struct fit *f)
+{
+    for (int i = 0; i < f->m->count; i++) {
+        struct lab is = lab_in(f, f->m->patches[i].xyz);
+        struct lab was = lab_in(f, display_forward(f->model, f->m->patches[i].counts));
+        double scale = scale_of(is);
+        f->measured[i] = is;
+        f->predicted[i] = was;
+        f->apart[i][0] = is.L - was.L;
+        f->apart[i][1] = is.a - was.a;
+        f->apart[i][2] = is.b - was.b;
+        f->weight[i] = scale * scale;
+        design_row(f, was, f->design + (long)i * LATTICE_NODES);
+    }
+}
+
+// Mean CIEDE2000 of the patches, each predicted from all the others.
+static double left_out_mean(const struct fit *f, const struct ridge *ridge, double penalty)
+{
+    double sum = 0;
+    ridge_left_out(ridge, penalty, f->left_out[0]);
+    for (int i = 0; i < f->m->count; i++) {
+        const double *d = f->left_out[i];
+        struct lab p = f->predicted[i];
+        f->de00[i] = delta_e_2000(f->measured[i], (struct lab){p.L + d[0], p.a + d[1], p.b + d[2]});
+        sum += f->de00[i];
+    }
+    return sum / f->m->count;
+}
+
+static double penalty_of(int k)
+{
+    return PENALTY_LEAST * pow(10, 0.5 * k);
+}
+
+static int best_penalty(const struct fit *f, const struct ridge *ridge)
+{
+    int best = 0;
+    double least = INFINITY;
+    for (int k = 0; k < PENALTIES; k++) {
+        double mean = left_out_mean(f, ridge, penalty_of(k));
+        if (mean < least) {
+            least = mean;
+            best = k;
+        }
+    }
+    left_out_mean(f, ridge, penalty_of(best));
+    return best;
+}
+
+// Huber's weights from the differences that the last penalty left.
+static void reweight(struct fit *f)
+{
+    double most = HUBER * summarise(f->de00, f->m->count).median;
+    for (int i = 0; i < f->m->count; i++) {
+        double scale = scale_of(f->measured[i]);
+        f->weight[i] = scale * scale * (f->de00[i] > most ? most / f->de00[i] : 1);
+    }
+}
+
+static struct ridge *decompose(const struct fit *f, struct error *err)
+{
+    const struct ridge_problem problem = {.rows = f->m->count,
+                                          .unknowns = LATTICE_NODES,
+                                          .values = 3,
+                                          .design = f->design,
+                                          .value = f->apart[0],
+                                          .weight = f->weight};
+    return ridge_create(&problem, err);
+}
+
+static void lay(const struct fit *f, const struct ridge *ridge, double penalty,
+                struct display_model *model)
+{
+    double c[LATTICE_NODES][3];
+    ridge_solve(ridge, penalty, c[0]);
+    model->kind = DISPLAY_RESIDUAL;
+    model->residual = f->box;
+    for (int k = 0; k < LATTICE_NODES; k++)
+        for (int j = 0; j <= k; j++)
+            for (int n = 0; n < 3; n++)
+                model->residual.node[k][n] += f->prior[k * LATTICE_NODES + j] * c[j][n];
+}
+
+static bool settle(const struct fit *f, const struct ridge *ridge, int from,
+                   struct residual_fit *found, struct error *err)
+{
+    struct display_model model = *f->model;
+    for (int k = from; k < PENALTIES; k++) {
+        lay(f, ridge, penalty_of(k), &model);
+        if (!display_model_prepare(&model, err))
+            continue;
+        *found = (struct residual_fit){penalty_of(k), ridge_freedom(ridge, penalty_of(k))};
+        *f->model = model;
+        return true;
+    }
+    return while_doing(err, "no residual that the patches allow");
+}
+
+static bool solve(struct fit *f, struct residual_fit *found, struct error *err)
+{
+    for (int round = 0;; round++) {
+        struct ridge *ridge = decompose(f, err);
+        if (!ridge)
+            return false;
+        int best = best_penalty(f, ridge);
+        bool last = round == ROUNDS - 1;
+        bool settled = last && settle(f, ridge, best, found, err);
+        ridge_destroy(ridge);
+        if (last)
+            return settled;
+        reweight(f);
+    }
+}
+
+bool residual_fit(const struct measurements *m, struct display_model *model,
+                  struct residual_fit *found, struct error *err)
+{
+    struct fit f = {.m = m, .model = model};
+    bool ok = take_room(&f, err);
+    if (ok) {
+        find_box(&f);
+        ok = find_prior(&f, err);
+    }
+    if (ok) {
+        find_rows(&f);
+        ok = solve(&f, found, err);
+    }
+    drop(&f);
+    return ok || while_doing(err, "%s", m->path);
+}
