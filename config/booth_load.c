@@ -23,7 +23,7 @@ struct path_field {
     size_t size;
 };
 
-enum { PATH_FIELDS = 12 };
+enum { PATH_FIELDS = 13 };
 
 static void path_fields(struct booth_settings *b, struct path_field out[PATH_FIELDS])
 {
