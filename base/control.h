@@ -34,6 +34,8 @@
 #define CONTROL_TRUTH                                                                              \
     "truth" // reflectance {nm, values} or flat -> XYZ a physical sample would show
 #define CONTROL_FAULT "fault" // instrument, kind
+#define CONTROL_PHOTOGRAPH                                                                         \
+    "photograph" // folder -> an exposure series of the ceiling in it
 
 struct control_client;
 

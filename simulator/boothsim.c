@@ -11,6 +11,7 @@
 #include "base/clock.h"
 #include "base/log.h"
 #include "simulator/boothsim_children.h"
+#include "simulator/photograph.h"
 #include "simulator/screen_xvfb.h"
 #include "simulator/wire.h"
 #include "simulator/world_control.h"
@@ -262,6 +263,10 @@ static json_t *on_request(void *context, const char *what, json_t *request, stru
 {
     struct booth *b = context;
     int64_t now = clock_now_ns();
+    const char *folder = json_string_value(json_object_get(request, "folder"));
+    if (!strcmp(what, CONTROL_PHOTOGRAPH))
+        return folder ? photograph(b->world, now, folder, err)
+                      : (fail(err, ERROR_CONFIG, "folder: is missing or no text"), NULL);
     json_t *answer = world_answer(b->world, now, what, request, err);
     world_faults_due(b->world, now, on_fault, b);
     return answer;

@@ -157,25 +157,36 @@ static double area_mean(const struct ceiling_image *c, int width, int height, in
     return sum / (bottom - top);
 }
 
-bool ceiling_camera_map(const struct ceiling_image *image, const struct scenario_ceiling *settings,
-                        const char *lamp, int seed, struct exr *out, struct error *err)
+bool ceiling_true_map(const struct ceiling_image *image, double k, const int map_px[2],
+                      struct exr *out, struct error *err)
 {
-    int width = settings->map_px[0], height = settings->map_px[1];
+    int width = map_px[0], height = map_px[1];
     if (!exr_init(out, width, height, 1, err))
         return false;
-    struct chance chance = chance_start(seed, lamp, 2);
-    double sign = chance_uniform(&chance) < 0.5 ? -1 : 1;
-    double scale = 1 + sign * settings->map_scale_error * (0.5 + 0.5 * chance_uniform(&chance));
     for (int row = 0; row < height; row++)
-        for (int column = 0; column < width; column++) {
-            double seen = area_mean(image, width, height, column, row) * scale;
-            seen *= 1 + settings->map_noise * chance_normal(&chance);
-            seen += settings->map_read_noise_cdm2 * chance_normal(&chance);
-            out->pixels[(size_t)row * width + column] = (float)seen;
-        }
+        for (int column = 0; column < width; column++)
+            out->pixels[(size_t)row * width + column] =
+                (float)(k * area_mean(image, width, height, column, row));
     snprintf(out->names[0], sizeof out->names[0], "Y");
     exr_set_number(out, "boothd.width_m", image->width_m);
     exr_set_number(out, "boothd.depth_m", image->depth_m);
+    return true;
+}
+
+bool ceiling_camera_map(const struct ceiling_image *image, const struct scenario_ceiling *settings,
+                        const char *lamp, int seed, struct exr *out, struct error *err)
+{
+    struct chance chance = chance_start(seed, lamp, 2);
+    double sign = chance_uniform(&chance) < 0.5 ? -1 : 1;
+    double scale = 1 + sign * settings->map_scale_error * (0.5 + 0.5 * chance_uniform(&chance));
+    if (!ceiling_true_map(image, scale, settings->map_px, out, err))
+        return false;
+    for (int i = 0; i < out->width * out->height; i++) {
+        double seen = (double)out->pixels[i];
+        seen *= 1 + settings->map_noise * chance_normal(&chance);
+        seen += settings->map_read_noise_cdm2 * chance_normal(&chance);
+        out->pixels[i] = (float)seen;
+    }
     exr_set_text(out, "boothd.lamp", lamp);
     return true;
 }

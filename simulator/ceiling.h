@@ -36,6 +36,11 @@ double ceiling_illuminance(const struct ceiling_image *image, struct vec3 p, str
 // disc lies outside.
 double ceiling_spot(const struct ceiling_image *image, double x_m, double z_m, double diameter_m);
 
+// Its luminance times k averaged onto a map of the given pixels. Channel "Y",
+// attributes boothd.width_m, boothd.depth_m.
+bool ceiling_true_map(const struct ceiling_image *image, double k, const int map_px[2],
+                      struct exr *out, struct error *err);
+
 // What a camera makes of it: averaged onto the map's pixels, off by a scale
 // error of the lamp's own, with noise that makes some dark pixels negative.
 // Channel "Y" in cd/m2, attributes boothd.width_m, boothd.depth_m, boothd.lamp.

@@ -7,6 +7,7 @@
 #include "files/ini.h"
 #include "simulator/model_ooi_kind.h"
 #include "simulator/model_witmotion.h"
+#include "simulator/sensor.h"
 
 #define DOUBLE(f, lo, hi, unit, preset, help)                                                      \
     {                                                                                              \
@@ -117,6 +118,44 @@ static const struct setting opentrack_rows[] = {
     VECTOR(zero_m, 3, -5, 5, "m", "0 0 0",
            "Where it was centred: to the observer's right, up, away from the camera."),
     BOOL(mirrored, "yes", "Its picture is mirrored; else x, yaw and roll have the other sign."),
+    {0},
+};
+#undef OWNER
+#define OWNER scenario_ceiling_camera
+static const char *const responses[] = {
+#define X(name, text) text,
+    SENSOR_RESPONSES(X)
+#undef X
+        NULL};
+static const struct setting ceiling_camera_rows[] = {
+    VECTOR(place_m, 3, -5, 5, "m", "0.02 0.05 0.08", "Place of the lens, booth frame."),
+    DOUBLE(pitch_deg, -60, 60, "deg", "3", "Turn about its x axis; at 0 it looks straight up."),
+    DOUBLE(yaw_deg, -60, 60, "deg", "-2", "Turn about its y axis."),
+    DOUBLE(roll_deg, -180, 180, "deg", "1.5", "Turn about the optical axis."),
+    INT(width_px, 16, 8192, "px", "1280", "Columns of a picture."),
+    INT(height_px, 16, 8192, "px", "960", "Rows of a picture."),
+    DOUBLE(focal_px, 10, 100000, "px", "820", "Focal length."),
+    VECTOR(axis_px, 2, -4096, 4096, "px", "4.5 -3.2",
+           "Where the optical axis falls, right of and below the middle."),
+    VECTOR(radial, 3, -10, 10, "", "-0.12 0.03 -0.004", "Radial distortion K1, K2, K3."),
+    VECTOR(decentred, 2, -1, 1, "", "0.0006 -0.0004", "Decentring distortion D1 (x), D2 (y)."),
+    DOUBLE(vignetting, -1, 1, "", "-0.06",
+           "Change of light with the squared tangent, beside the fourth power of the cosine."),
+    BOOL(colour, "no", "Three colour channels instead of one."),
+    INT(bits, 8, 16, "", "8", "Bits of a count: 8 or 16."),
+    {"response", SETTING_ENUM, offsetof(struct OWNER, response), 0, 0, 0, "", responses, "film",
+     "How counts follow light."},
+    DOUBLE(sensitivity, 1e-3, 1e9, "e/(cd/m2 s)", "2000", "Electrons of a pixel on the axis."),
+    DOUBLE(full_well_e, 100, 1e7, "e", "20000", "Electrons that a pixel holds."),
+    DOUBLE(read_noise_e, 0, 1000, "e", "8", "Noise of reading a pixel."),
+    DOUBLE(dark_e_s, 0, 1e5, "e/s", "12", "Dark current."),
+    DOUBLE(hot_share, 0, 0.1, "", "0.0005", "Share of hot pixels."),
+    DOUBLE(shortest_s, 1e-6, 60, "s", "0.000125", "Shortest exposure."),
+    DOUBLE(ratio, 1.05, 16, "", "2.3", "Each exposure over the one before."),
+    INT(exposures, 1, 32, "", "10", "How many exposures."),
+    INT(darks, 0, 32, "", "3", "How many of the longest are taken with a capped lens too."),
+    INT(flats, 0, 16, "", "4", "How many pictures of a field of equal luminance."),
+    DOUBLE(wall_reflectance, 0, 1, "", "0.3", "Reflectance of the walls around the ceiling."),
     {0},
 };
 #undef OWNER
@@ -231,6 +270,7 @@ static void sections_of(struct scenario *s, struct settings_section out[SECTIONS
         {"head", head_rows, &s->head},
         {"camera", camera_rows, &s->camera},
         {"opentrack", opentrack_rows, &s->opentrack},
+        {"ceiling_camera", ceiling_camera_rows, &s->ceiling_camera},
         {"panel", panel_rows, &s->panel},
         {"spectrometer", spectrometer_rows, &s->spectrometer},
         {"spectrometer2", spectrometer_2_rows, &s->spectrometer_2},
@@ -302,6 +342,9 @@ static bool check(const struct scenario *s, struct error *err)
         return fail(err, ERROR_CONFIG, "[world] lamp: \"%s\" is no lamp of this booth", first);
     if (s->panel.bits == 9)
         return fail(err, ERROR_CONFIG, "[panel] bits: 9 is neither 8 nor 10");
+    if (s->ceiling_camera.bits != 8 && s->ceiling_camera.bits != 16)
+        return fail(err, ERROR_CONFIG, "[ceiling_camera] bits: %d is neither 8 nor 16",
+                    s->ceiling_camera.bits);
     if (s->panel.black_cdm2 >= s->panel.white_cdm2)
         return fail(err, ERROR_CONFIG, "[panel] black_cdm2: %g is not below white_cdm2 %g",
                     s->panel.black_cdm2, s->panel.white_cdm2);

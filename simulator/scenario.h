@@ -66,6 +66,20 @@ struct scenario_opentrack {
     bool mirrored; // its picture
 };
 
+// The still camera that photographs the ceiling, see lens.h and sensor.h.
+struct scenario_ceiling_camera {
+    double place_m[3], pitch_deg, yaw_deg, roll_deg;
+    int width_px, height_px;
+    double focal_px, axis_px[2]; // where the optical axis falls from the middle
+    double radial[3], decentred[2], vignetting;
+    bool colour;
+    int bits, response; // enum sensor_response
+    double sensitivity, full_well_e, read_noise_e, dark_e_s, hot_share;
+    double shortest_s, ratio;
+    int exposures, darks, flats;
+    double wall_reflectance;
+};
+
 struct scenario_panel {
     double white_cdm2, black_cdm2, reflectance;
     int bits;
@@ -132,6 +146,7 @@ struct scenario {
     struct scenario_head head;
     struct scenario_camera camera;
     struct scenario_opentrack opentrack;
+    struct scenario_ceiling_camera ceiling_camera;
     struct scenario_panel panel;
     struct scenario_spectrometer spectrometer;
     struct scenario_radiometer radiometer;

@@ -240,6 +240,12 @@ static double output_of(const struct world *w, const struct world_state *s, int 
     return s->level[lamp] * lamp_warmth(&w->lamps[lamp], s->on_s[lamp]);
 }
 
+double world_output(struct world *world, int64_t at_ns, int lamp)
+{
+    struct world_state s = state_at(world, world_seconds(world, at_ns));
+    return world_lamp(world, lamp) ? output_of(world, &s, lamp) : 0;
+}
+
 static void add_light(const struct world *w, int lamp, double k, struct spectrum *out)
 {
     for (int i = 0; k != 0 && i < SPECTRUM_COUNT; i++)

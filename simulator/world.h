@@ -51,6 +51,9 @@ struct world_state {
 };
 void world_state_at(struct world *world, int64_t at_ns, struct world_state *out);
 
+// Light of a lamp at a moment over that at level 1, warm; 0 where there is none.
+double world_output(struct world *world, int64_t at_ns, int lamp);
+
 // Spectral irradiance (W m-2 nm-1) at a moment on the plane of the screen
 // about a pixel, averaged over the radiometer's spot: 1 nm, dense over the
 // true ceiling. What a radiometer sees of a matt sample there is R E / pi.
