@@ -12,7 +12,6 @@
 #define C2_M_K 1.4388e-2
 #define DAYLIGHT_LEAST_K 4000.0
 #define DAYLIGHT_MOST_K 25000.0
-#define DAYLIGHT_SCALE (1.4388 / 1.4380) // nominal to today's temperature scale
 #define PLANCK_LEAST_K 100.0
 #define PLANCK_MOST_K 1e6
 

@@ -15,6 +15,9 @@ bool illuminant(const char *name, struct spectrum *out, struct error *err);
 // Names of the fixed ones, NULL-terminated.
 const char *const *illuminant_names(void);
 
+// Today's temperature of daylight over its nominal one.
+#define DAYLIGHT_SCALE (1.4388 / 1.4380)
+
 // Daylight from S0, S1, S2 for a nominal correlated colour temperature,
 // 4000..25000 K (else RANGE), M1 and M2 rounded to three decimals.
 // Source: CIE 015:2018 (4.1.2).

@@ -5,6 +5,7 @@
 #define COLORIMETRY_TABLES_TABLES_H
 
 #include "colorimetry/colour.h"
+#include "colorimetry/rendering.h"
 
 // x, y, z of each observer on the inner grid.
 extern const struct spectrum OBSERVER_CMF[OBSERVER_COUNT][3];
@@ -13,6 +14,9 @@ enum { TABLE_STEP_NM = 5, DAYLIGHT_BASIS_COUNT = 95 };
 
 // S0, S1, S2 from 360 nm in steps of 5 nm.
 extern const double DAYLIGHT_BASIS[3][DAYLIGHT_BASIS_COUNT];
+
+// Test colours of CIE 13.3, reflectance 0..1 at the same wavelengths.
+extern const double TEST_COLOUR[TEST_COLOURS][DAYLIGHT_BASIS_COUNT];
 
 // Relative power from first_nm in steps of 5 nm.
 struct illuminant_table {
