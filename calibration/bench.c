@@ -38,6 +38,16 @@ void bench_close(struct bench *b)
     *b = (struct bench){0};
 }
 
+bool bench_emulated(const struct bench *b)
+{
+    size_t i;
+    json_t *reading;
+    bool any = b->booth;
+    json_array_foreach(b->readings, i, reading)
+        any = any || json_is_true(json_object_get(reading, "emulated"));
+    return any;
+}
+
 static bool done(json_t *reply)
 {
     json_decref(reply);
@@ -338,6 +348,15 @@ bool bench_aim_ceiling(struct bench *b, double x_m, double z_m, struct error *er
                    json_pack("{ss,ss,sf,sf}", "do", CONTROL_AIM, "target", "ceiling", "x_m", x_m,
                              "z_m", z_m),
                    err, please);
+}
+
+bool bench_place_spectrometer(struct bench *b, const char *where, struct error *err)
+{
+    char please[128];
+    if (b->booth)
+        return fail(err, ERROR_CONFIG, "the emulated booth's spectrometer cannot be moved");
+    snprintf(please, sizeof please, "Place the spectrometer at %s", where);
+    return by_hand(b, NULL, err, please);
 }
 
 static json_t *sample_of(const struct spectrum *reflectance)

@@ -33,6 +33,9 @@ bool bench_open(struct bench *b, const struct booth_settings *settings, const ch
 // Accepts a zeroed bench.
 void bench_close(struct bench *b);
 
+// Whether anything here is emulated: the booth, or an instrument that was read.
+bool bench_emulated(const struct bench *b);
+
 // ---- boothd ----------------------------------------------------------------
 
 // The daemon's status, a new reference; NULL on failure.
@@ -98,6 +101,10 @@ bool bench_aim_screen(struct bench *b, double x_px, double y_px, struct error *e
 bool bench_aim_screen_from(struct bench *b, double x_px, double y_px, struct vec3 from,
                            struct error *err);
 bool bench_aim_ceiling(struct bench *b, double x_m, double z_m, struct error *err);
+
+// Asks for the spectrometer at a place, such as "the far left of the booth's
+// floor". Error CONFIG with an emulated booth, where it stands still.
+bool bench_place_spectrometer(struct bench *b, const char *where, struct error *err);
 
 // Absolute XYZ (cd/m2) that physical samples of those reflectances would send
 // from the aimed place. Emulated booth only.

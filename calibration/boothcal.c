@@ -15,6 +15,8 @@ static const struct command FAMILIES[] = {
      "from bare settings to an accuracy report"},
     {"spectrometer", command_spectrometer, "dark|wavelength|linearity|raw",
      "calibrating the spectrometer itself: stored darks, wavelengths, linearity"},
+    {"audit", command_audit, "SPECTRUM... | --lamps FOLDER | --config FILE --lamp NAME...",
+     "what the spectrometer alone can tell of a booth's lamps"},
     {"list", command_list, "[--config FILE] [--json] | --udev",
      "instruments found, their serial numbers and permissions; the udev rules"},
     {NULL, NULL, NULL, NULL},

@@ -45,5 +45,6 @@ int command_light(int argc, char **argv);
 int command_session(int argc, char **argv);
 int command_list(int argc, char **argv);
 int command_spectrometer(int argc, char **argv);
+int command_audit(int argc, char **argv);
 
 #endif

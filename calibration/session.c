@@ -173,18 +173,6 @@ static bool steps(struct session *s, struct error *err)
     return session_poses(s, err) && (f->settings = bench_status(&s->bench, err));
 }
 
-// Emulated as soon as anything says so: the booth's settings, an instrument,
-// whoever answers for the reference.
-static bool emulated(const struct session_facts *f)
-{
-    size_t i;
-    json_t *reading;
-    bool any = f->truth_emulated || json_is_true(json_object_get(f->settings, "emulated"));
-    json_array_foreach(f->readings, i, reading)
-        any = any || json_is_true(json_object_get(reading, "emulated"));
-    return any;
-}
-
 static bool reached(const struct session_facts *f)
 {
     bool all = true;
@@ -198,7 +186,8 @@ static bool run(struct session *s, const struct options *o, struct error *err)
     int64_t began = clock_now_ns();
     if (!booth_load(o->config, NULL, 0, &s->settings, err) || !begin(s, o, err) || !steps(s, err))
         return false;
-    s->facts->emulated = emulated(s->facts);
+    s->facts->emulated = bench_emulated(&s->bench) ||
+                         json_is_true(json_object_get(s->facts->settings, "emulated"));
     clock_utc(s->facts->finished);
     s->facts->seconds = (double)(clock_now_ns() - began) / 1e9;
     if (!report_save(s->facts, s->out, err))

@@ -255,7 +255,7 @@ static const struct setting lamp_rows[] = {
 };
 #undef OWNER
 
-enum { SECTIONS = 13, SECTIONS_ALL = SECTIONS + SCENARIO_LAMPS_MOST + 1 };
+enum { SECTIONS = 14, SECTIONS_ALL = SECTIONS + SCENARIO_LAMPS_MOST + 1 };
 
 static const char *const lamp_sections[SCENARIO_LAMPS_MOST] = {"lamp1", "lamp2", "lamp3",
                                                                "lamp4", "lamp5", "lamp6"};
