@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/random.h"
 #include "calibration/statistics.h"
 
 static const double FULL = 255;
@@ -13,20 +14,6 @@ enum {
     GREYS = 2,      // greys a step of the ramps: errors of a neutral are seen first
     NEAR_BLACK = 16 // codes: below it a ramp's steps are wide
 };
-
-// SplitMix64 (Steele, Lea, Flood 2014).
-static uint64_t next_random(uint64_t *state)
-{
-    uint64_t z = (*state += UINT64_C(0x9e3779b97f4a7c15));
-    z = (z ^ (z >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
-    z = (z ^ (z >> 27)) * UINT64_C(0x94d049bb133111eb);
-    return z ^ (z >> 31);
-}
-
-static double uniform(uint64_t *state)
-{
-    return (double)(next_random(state) >> 11) / 9007199254740992.0;
-}
 
 static double code(double fraction)
 {
@@ -44,10 +31,10 @@ static void add(struct patch_set *set, double r, double g, double b)
     set->patches[set->count++] = (struct display_patch){.counts = {code(r), code(g), code(b)}};
 }
 
-static void shuffle(struct display_patch *patches, int count, uint64_t *state)
+static void shuffle(struct display_patch *patches, int count, struct random *state)
 {
     for (int i = count - 1; i > 0; i--) {
-        int j = (int)(next_random(state) % (uint64_t)(i + 1));
+        int j = (int)(random_bits(state) % (uint64_t)(i + 1));
         struct display_patch swap = patches[i];
         patches[i] = patches[j];
         patches[j] = swap;
@@ -70,18 +57,18 @@ static void add_ramps(struct patch_set *set, int steps)
     add(set, 0, 0, 0);
 }
 
-static void add_near_black(struct patch_set *set, int count, uint64_t *state)
+static void add_near_black(struct patch_set *set, int count, struct random *state)
 {
     for (int i = 0; i < count; i++) {
-        double r = uniform(state), g = uniform(state), b = uniform(state);
+        double r = random_uniform(state), g = random_uniform(state), b = random_uniform(state);
         add(set, r * NEAR_BLACK / FULL, g * NEAR_BLACK / FULL, b * NEAR_BLACK / FULL);
     }
 }
 
-static void add_random(struct patch_set *set, int count, uint64_t *state)
+static void add_random(struct patch_set *set, int count, struct random *state)
 {
     for (int i = 0; i < count; i++) {
-        double r = uniform(state), g = uniform(state), b = uniform(state);
+        double r = random_uniform(state), g = random_uniform(state), b = random_uniform(state);
         double grey = (r + g + b) / 3, pull = i % 3 ? 0.6 : 0; // surfaces are seldom saturated
         add(set, r + pull * (grey - r), g + pull * (grey - g), b + pull * (grey - b));
     }
@@ -116,7 +103,7 @@ bool patch_set_characterise(const struct patch_sizes *z, uint64_t seed, struct p
         patch_set_fini(&set);
         return fail(err, ERROR_SYSTEM, "out of memory for %d patches", body);
     }
-    uint64_t state = seed;
+    struct random state = {seed};
     add_ramps(&plain, z->ramp_steps);
     add_random(&plain, z->random, &state);
     add_near_black(&plain, z->near_black, &state);
@@ -132,11 +119,11 @@ bool patch_set_verify(int random, uint64_t seed, struct patch_set *out, struct e
     struct patch_set set = {.patches = calloc((size_t)random, sizeof *set.patches)};
     if (!set.patches)
         return fail(err, ERROR_SYSTEM, "out of memory");
-    uint64_t state = seed;
+    struct random state = {seed};
     for (int i = 0; i < random; i++) {
-        double level = 0.8 * uniform(&state), span = i % 2 ? 0.2 : 1;
+        double level = 0.8 * random_uniform(&state), span = i % 2 ? 0.2 : 1;
         double base = i % 2 ? level : 0;
-        double r = uniform(&state), g = uniform(&state), b = uniform(&state);
+        double r = random_uniform(&state), g = random_uniform(&state), b = random_uniform(&state);
         add(&set, base + span * r, base + span * g, base + span * b);
     }
     *out = set;

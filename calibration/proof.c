@@ -3,8 +3,7 @@
 
 #include <math.h>
 
-static const double WHITE_PATCH_FACTOR = 1.13;
-static const struct xyz D65_WHITE = {0.95047, 1, 1.08883};
+const struct xyz proof_white = {0.95047, 1, 1.08883};
 
 const struct published_row published_table[3] = {
     {"D65", {0.4, 0.3, 0.8, 1.7}, {0.8, 0.4, 1.4, 1.6}, {0}},
@@ -17,13 +16,18 @@ static struct xyz divided(struct xyz c, double by)
     return (struct xyz){c.X / by, c.Y / by, c.Z / by};
 }
 
+struct mat3 proof_adaptation(struct xyz white)
+{
+    return cat_matrix(CAT_02, white, proof_white, 1);
+}
+
 bool proof_published_difference(struct xyz a, struct xyz b, struct xyz white, double *de,
                                 struct error *err)
 {
-    struct mat3 adapt = cat_matrix(CAT_02, white, D65_WHITE, 1);
+    struct mat3 adapt = proof_adaptation(white);
     struct lab la, lb;
-    if (!lab_of(xyz_apply(adapt, a), D65_WHITE, &la, err) ||
-        !lab_of(xyz_apply(adapt, b), D65_WHITE, &lb, err))
+    if (!lab_of(xyz_apply(adapt, a), proof_white, &la, err) ||
+        !lab_of(xyz_apply(adapt, b), proof_white, &lb, err))
         return false;
     *de = delta_e_2000(la, lb);
     return true;
@@ -35,11 +39,11 @@ static bool judge_patch(struct lamp_report *lamp, struct patch_report *p, struct
     struct xyz white = divided(lamp->white_reference, lamp->white_reference.Y);
     struct xyz taught = divided(lamp->white_taught, lamp->white_taught.Y);
     struct lab reference, measured;
-    if (!proof_published_difference(divided(p->full, WHITE_PATCH_FACTOR * w->full.Y),
-                                    divided(p->bands, WHITE_PATCH_FACTOR * w->bands.Y), taught,
+    if (!proof_published_difference(divided(p->full, PROOF_WHITE_PATCH * w->full.Y),
+                                    divided(p->bands, PROOF_WHITE_PATCH * w->bands.Y), taught,
                                     &p->de_simulation, err) ||
-        !proof_published_difference(divided(p->reference, WHITE_PATCH_FACTOR * w->reference.Y),
-                                    divided(p->measured, WHITE_PATCH_FACTOR * w->measured.Y), white,
+        !proof_published_difference(divided(p->reference, PROOF_WHITE_PATCH * w->reference.Y),
+                                    divided(p->measured, PROOF_WHITE_PATCH * w->measured.Y), white,
                                     &p->de_published, err) ||
         !lab_of(p->reference, lamp->white_reference, &reference, err) ||
         !lab_of(p->measured, lamp->white_reference, &measured, err))
@@ -53,7 +57,8 @@ bool proof_judge(struct lamp_report *lamp, struct error *err)
     const struct patch_report *w = &lamp->patches[lamp->white_patch];
     if (!(w->measured.Y > 0 && w->reference.Y > 0 && w->full.Y > 0 && w->bands.Y > 0 &&
           lamp->white_reference.Y > 0 && lamp->white_taught.Y > 0))
-        return fail(err, ERROR_DATA, "lamp %s: a white whose luminance is not positive", lamp->name);
+        return fail(err, ERROR_DATA, "lamp %s: a white whose luminance is not positive",
+                    lamp->name);
     double all[3][FACTS_PATCHES], inside[2][FACTS_PATCHES];
     int inside_count = 0;
     for (int i = 0; i < lamp->patch_count; i++) {

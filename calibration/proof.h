@@ -23,6 +23,14 @@
 // Errors (DATA, RANGE): a white that is not positive.
 bool proof_judge(struct lamp_report *lamp, struct error *err);
 
+// As published: the white patch stands for this share of a perfect diffuser,
+// and CIELAB is that of this white (D65, Y = 1).
+#define PROOF_WHITE_PATCH 1.13
+extern const struct xyz proof_white;
+
+// Adapts colours under a lamp whose perfect diffuser is white to proof_white.
+struct mat3 proof_adaptation(struct xyz white);
+
 // One colour difference as published: both colours are already divided, Y = 1
 // for the perfect diffuser; white is the lamp's perfect diffuser.
 bool proof_published_difference(struct xyz a, struct xyz b, struct xyz white, double *de,
