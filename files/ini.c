@@ -159,14 +159,14 @@ static bool check_lines(struct reading *r, const char *text, size_t size)
     return ok;
 }
 
-static bool check_missing(const struct reading *r)
+bool ini_complete(const char *path, const struct settings_section *sections, const bool *given,
+                  struct error *err)
 {
-    const bool *seen = r->seen;
-    for (const struct settings_section *s = r->sections; s->name; s++)
-        for (const struct setting *row = s->rows; row->name; row++, seen++)
-            if (!row->preset && !*seen)
-                return fail(r->err, ERROR_CONFIG, "%s: [%s] %s is missing and must be given: %s",
-                            r->path, s->name, row->name, row->help);
+    for (const struct settings_section *s = sections; s->name; s++)
+        for (const struct setting *row = s->rows; row->name; row++, given++)
+            if (!row->preset && !*given)
+                return fail(err, ERROR_CONFIG, "%s: [%s] %s is missing and must be given: %s", path,
+                            s->name, row->name, row->help);
     return true;
 }
 
@@ -187,31 +187,65 @@ static bool parse(struct reading *r, const char *text)
     if (line < 0)
         return fail(r->err, ERROR_SYSTEM, "%s: out of memory", r->path);
     if (!line)
-        return check_missing(r);
+        return true;
     show_line(shown, text, line);
     return fail(r->err, ERROR_CONFIG,
                 "%s:%d: \"%s\" is neither [section], key = value nor a # comment", r->path, line,
                 shown);
 }
 
-bool ini_load(const char *path, const struct settings_section *sections, struct error *err)
+size_t ini_rows(const struct settings_section *sections)
+{
+    size_t rows = 0;
+    for (const struct settings_section *s = sections; s->name; s++)
+        rows += count_rows(s);
+    return rows;
+}
+
+static bool read_onto(const char *path, const struct settings_section *sections, bool *seen,
+                      struct error *err)
 {
     static pthread_once_t once = PTHREAD_ONCE_INIT;
     pthread_once(&once, configure_library);
     struct error own;
-    size_t size, rows = 0;
+    size_t size;
     char *text = file_read(path, BYTES_MOST, &size, err);
     if (!text)
         return false;
-    for (const struct settings_section *s = sections; s->name; s++) {
-        settings_preset(s->rows, s->target);
-        rows += count_rows(s);
-    }
-    struct reading r = {path, sections, calloc(rows + 1, sizeof(bool)), false, err ? err : &own};
-    bool ok = r.seen ? check_lines(&r, text, size) && parse(&r, text)
-                     : fail(err, ERROR_SYSTEM, "%s: out of memory", path);
-    free(r.seen);
+    struct reading r = {path, sections, seen, false, err ? err : &own};
+    bool ok = check_lines(&r, text, size) && parse(&r, text);
     free(text);
+    return ok;
+}
+
+static bool *nothing_seen(const char *path, const struct settings_section *sections,
+                          struct error *err)
+{
+    bool *seen = calloc(ini_rows(sections) + 1, sizeof *seen);
+    if (!seen)
+        fail(err, ERROR_SYSTEM, "%s: out of memory", path);
+    return seen;
+}
+
+bool ini_load_onto(const char *path, const struct settings_section *sections, bool *given,
+                   struct error *err)
+{
+    bool *seen = nothing_seen(path, sections, err);
+    bool ok = seen && read_onto(path, sections, seen, err);
+    for (size_t i = 0; ok && given && i < ini_rows(sections); i++)
+        given[i] = given[i] || seen[i];
+    free(seen);
+    return ok;
+}
+
+bool ini_load(const char *path, const struct settings_section *sections, struct error *err)
+{
+    bool *seen = nothing_seen(path, sections, err);
+    for (const struct settings_section *s = sections; s->name; s++)
+        settings_preset(s->rows, s->target);
+    bool ok =
+        seen && read_onto(path, sections, seen, err) && ini_complete(path, sections, seen, err);
+    free(seen);
     return ok;
 }
 

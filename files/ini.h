@@ -16,6 +16,21 @@
 // that is missing, bytes that are not text. Targets are undefined on failure.
 bool ini_load(const char *path, const struct settings_section *sections, struct error *err);
 
+// As ini_load, but a field that the file does not name keeps its value, and
+// none must be named: ini_missing says so. given (may be NULL) has an element
+// for every row of every section, in their order; those the file names become
+// true, the others stay.
+bool ini_load_onto(const char *path, const struct settings_section *sections, bool *given,
+                   struct error *err);
+
+// The first row without a preset that is not given, as ini_load refuses it:
+// false with err (CONFIG), naming path.
+bool ini_complete(const char *path, const struct settings_section *sections, const bool *given,
+                  struct error *err);
+
+// Rows of all sections: elements of such a given.
+size_t ini_rows(const struct settings_section *sections);
+
 // Writes all sections, each with every key, by write-fsync-rename. Refuses
 // (CONFIG) a value that ini_load would not take back: outside its range, or
 // text with line ends or with blanks at its ends.

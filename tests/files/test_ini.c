@@ -291,6 +291,36 @@ static void several_threads_may_load_at_once(void **state)
     }
 }
 
+static void a_file_over_another_leaves_what_it_does_not_name(void **state)
+{
+    (void)state;
+    struct both b = {0};
+    bool given[5] = {0};
+    struct error err = {0};
+    struct settings_section sections[] = {
+        {"screen", SCREEN, &b.screen}, {"stand", STAND, &b.stand}, {0}};
+    assert_int_equal(ini_rows(sections), 5);
+    assert_true(
+        ini_load(put_text("a.ini", "[screen]\nwidth_m = 0.5\nname = first\n"), sections, &err));
+    assert_true(
+        ini_load_onto(put_text("b.ini", "[screen]\nname = second\n[stand]\neye_m = 1 2 3\n"),
+                      sections, given, &err));
+    assert_true(b.screen.width_m == 0.5);
+    assert_string_equal(b.screen.name, "second");
+    assert_true(b.stand.eye_m[2] == 3);
+    const bool expected[5] = {false, false, true, false, true};
+    assert_memory_equal(given, expected, sizeof given);
+    assert_false(ini_complete("b.ini", sections, given, &err));
+    assert_string_equal(err.text, "b.ini: [screen] width_m is missing and must be given: Width of "
+                                  "the screen.");
+    assert_true(ini_load_onto(put_text("c.ini", "[screen]\nwidth_m = 1\n"), sections, given, &err));
+    assert_true(ini_complete("c.ini", sections, given, &err));
+    assert_true(given[2] && given[4]);
+    assert_true(ini_load_onto(put_text("d.ini", ""), sections, NULL, &err));
+    assert_false(ini_load_onto(put_text("d.ini", "[stand]\nbits = 8\n"), sections, given, &err));
+    assert_complaint(err.text, "d.ini:2: [stand] bits = 8: no such setting; allowed: eye_m");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -311,6 +341,7 @@ int main(void)
         cmocka_unit_test(what_is_saved_loads_to_the_same_values),
         cmocka_unit_test(what_would_not_load_is_not_saved),
         cmocka_unit_test(several_threads_may_load_at_once),
+        cmocka_unit_test(a_file_over_another_leaves_what_it_does_not_name),
     };
     return cmocka_run_group_tests_name("ini", tests, open_place, close_place);
 }
