@@ -9,6 +9,7 @@
 static const char *const output_names[] = {"auto", "window", "offscreen", NULL};
 static const char *const spectral_names[] = {"auto", "bands", "product", "full", NULL};
 static const char *const cut_names[] = {"variance", "energy", NULL};
+static const char *const expired_names[] = {"refuse", "warn", NULL};
 static const char *const eye_filter_names[] = {"none", "one-euro", "kalman", NULL};
 static const char *const bits_names[] = {"8", "10", NULL};
 static const char *const observer_names[] = {
@@ -39,7 +40,8 @@ static const struct setting stand_rows[] = {
     {"hinge_m", SETTING_VECTOR, AT(stand.stand.hinge_m), 3, -10, 10, "m", NULL, "0 0 0",
      "A point of the hinge line (x right, y up, z towards the observer)."},
     {"centre_from_hinge_m", SETTING_VECTOR, AT(stand.stand.centre_from_hinge_m), 3, -10, 10, "m",
-     NULL, NULL, "Centre of the screen from the hinge, in the screen's axes (right, up, out)."},
+     NULL, NULL, "Centre of the screen from the hinge, in the screen's axes (right, up, out), unless a "
+     "calibration of the store gives it."},
     {"default_tilt_deg", SETTING_DOUBLE, AT(stand.default_tilt_deg), 0, -180, 180, "deg", NULL,
      "30", "Tilt believed until the accelerometer has spoken; 0 lies flat, 90 stands upright."},
     {0}};
@@ -67,11 +69,13 @@ static const struct setting tracker_rows[] = {
     {0}};
 
 static const struct setting display_rows[] = {
+    {"serial", SETTING_TEXT, AT(display.serial), ROOM(display.serial), 0, 0, "", NULL, "",
+     "Panel and serial number of the proof screen, by which its calibrations are kept."},
     {"model", SETTING_TEXT, AT(display.model), ROOM(display.model), 0, 0, "", NULL, "",
-     "File of the fitted display model (boothcal display fit); empty: none yet."},
+     "File of the fitted display model (boothcal display fit); empty: the store's, or none yet."},
     {"view", SETTING_TEXT, AT(display.view), ROOM(display.view), 0, 0, "", NULL, "",
      "File of the display's fitted dependence on direction and place (boothcal display view); "
-     "empty: none, colours hold along the normal of the screen's centre."},
+     "empty: the store's, or none: colours hold along the normal of the screen's centre."},
     {"bits", SETTING_ENUM, AT(display.bits_choice), 0, 0, 0, "", bits_names, "8",
      "Bits per channel that the display takes."},
     {"dither", SETTING_BOOL, AT(display.dither), 0, 0, 0, "", NULL, "yes",
@@ -87,8 +91,9 @@ static const struct setting display_rows[] = {
     {0}};
 
 static const struct setting lamps_rows[] = {
-    {"folder", SETTING_TEXT, AT(lamps.folder), ROOM(lamps.folder), 0, 0, "", NULL, "lamps",
-     "Folder of the taught lamps (NAME.ini, NAME.sp, luminance map)."},
+    {"folder", SETTING_TEXT, AT(lamps.folder), ROOM(lamps.folder), 0, 0, "", NULL, "",
+     "Folder of the taught lamps (NAME.ini, NAME.sp, luminance map); empty: the store's, or "
+     "'lamps' where there is no store."},
     {"declared", SETTING_TEXT, AT(lamps.declared), ROOM(lamps.declared), 0, 0, "", NULL, "",
      "Lamp taken for granted in a booth without a spectrometer; empty: none."},
     {0}};
@@ -142,6 +147,17 @@ static const struct setting state_rows[] = {
      "Greatest difference of spectral shape at which a lamp is still recognised."},
     {"confirmations", SETTING_INT, AT(state.confirmations), 0, 1, 20, "", NULL, "2",
      "Readings in a row that must agree before another lamp is believed."},
+    {0}};
+
+static const struct setting calibration_rows[] = {
+    {"store", SETTING_TEXT, AT(calibration.store), ROOM(calibration.store), 0, 0, "", NULL, "",
+     "Folder of the store of calibrations, which provides display model, lamps and geometry where "
+     "nothing here names them; empty: none."},
+    {"valid_days", SETTING_DOUBLE, AT(calibration.valid_days), 0, 0, 3650, "d", NULL, "30",
+     "How long a new calibration of display and lamps is valid; 0: for ever."},
+    {"expired", SETTING_ENUM, AT(calibration.expired), 0, 0, 0, "", expired_names, "refuse",
+     "What becomes of a calibration past that time: nothing is shown (refuse), or it is said "
+     "(warn)."},
     {0}};
 
 static const struct setting control_rows[] = {
@@ -236,5 +252,6 @@ void booth_tables_init(struct booth_tables *tables, struct booth_settings *booth
     section(&g, "materials", materials_rows);
     section(&g, "quality", quality_rows);
     section(&g, "state", state_rows);
+    section(&g, "calibration", calibration_rows);
     section(&g, "control", control_rows);
 }

@@ -22,21 +22,45 @@ enum booth_output {
 // How the place of the eye is smoothed.
 enum eye_filter { EYE_FILTER_NONE, EYE_FILTER_ONE_EURO, EYE_FILTER_KALMAN };
 
+// What becomes of a calibration past its time.
+enum expired_rule { EXPIRED_REFUSE, EXPIRED_WARN };
+
+// The settings that the store of calibrations provides where nobody gives them.
+#define BOOTH_STORED(X)                                                                            \
+    X(MODEL, "display", "model")                                                                   \
+    X(LAMPS, "lamps", "folder")                                                                    \
+    X(HINGE, "stand", "hinge_m") /* from here on of geometry.ini */                                \
+    X(CENTRE, "stand", "centre_from_hinge_m")                                                      \
+    X(PLACE, "tracker", "place_m")                                                                 \
+    X(PITCH, "tracker", "pitch_deg")                                                               \
+    X(YAW, "tracker", "yaw_deg")                                                                   \
+    X(ROLL, "tracker", "roll_deg")
+
+enum booth_stored {
+#define X(name, section, key) STORED_##name,
+    BOOTH_STORED(X)
+#undef X
+        STORED_COUNT
+};
+
+// "stand.hinge_m".
+const char *booth_stored_name(enum booth_stored row);
+
 // How long what an instrument said is believed when it says nothing more.
 struct state_settings {
-    double lamp_hold_s;   // 0..3600: lamp and level
-    double tilt_hold_s;   // 0..3600
-    double eye_hold_s;    // 0..3600
-    double level_s;       // 0..60: time constant of the lamp's level
-    double tilt_s;        // 0..10: time constant of the tilt
-    int eye_filter;       // enum eye_filter
-    double eye_s;         // 0..10: time constant of the resting eye, one-euro
-    double eye_noise_m;   // 0.0001..0.1: of one place seen, kalman
+    double lamp_hold_s;      // 0..3600: lamp and level
+    double tilt_hold_s;      // 0..3600
+    double eye_hold_s;       // 0..3600
+    double level_s;          // 0..60: time constant of the lamp's level
+    double tilt_s;           // 0..10: time constant of the tilt
+    int eye_filter;          // enum eye_filter
+    double eye_s;            // 0..10: time constant of the resting eye, one-euro
+    double eye_noise_m;      // 0.0001..0.1: of one place seen, kalman
     double eye_acceleration; // 0.01..100 m/s2: of a head, kalman
-    double eye_ahead_s;   // 0..0.05: from a frame's start to its light; 0 = the eye as last seen
-    double dark_lux;      // 0..1000: below it no lamp is on
-    double lamp_distance; // 0.001..1: greatest shape distance of a known lamp
-    int confirmations;    // 1..20: equal readings before another lamp is believed
+    double eye_ahead_s;      // 0..0.05: from a frame's start to its light; 0 = the eye as last seen
+    double dark_lux;         // 0..1000: below it no lamp is on
+    double lamp_distance;    // 0.001..1: greatest shape distance of a known lamp
+    int confirmations;       // 1..20: equal readings before another lamp is believed
 };
 
 struct booth_settings {
@@ -71,9 +95,10 @@ struct booth_settings {
         struct radiometer_options options;
     } radiometer;
     struct {
-        char model[512]; // fitted display model, "" = none
-        char view[512];  // fitted dependence on direction and place, "" = none
-        int bits_choice; // see booth_bits
+        char serial[128]; // panel and serial number, "" = not told
+        char model[512];  // fitted display model, "" = none
+        char view[512];   // fitted dependence on direction and place, "" = none
+        int bits_choice;  // see booth_bits
         bool dither;
         double reflectance; // diffuse, of the screen's surface, 0..0.2
         int output;         // enum booth_output
@@ -81,7 +106,7 @@ struct booth_settings {
         bool fullscreen;
     } display;
     struct {
-        char folder[512];
+        char folder[512];  // "" = the store has none yet
         char declared[64]; // lamp taken for granted where there is no spectrometer, "" = none
     } lamps;
     struct {
@@ -97,11 +122,17 @@ struct booth_settings {
     } quality;
     struct state_settings state;
     struct {
+        char store[512];   // folder of the store, "" = none
+        double valid_days; // of a new calibration, 0 = for ever
+        int expired;       // enum expired_rule
+    } calibration;
+    struct {
         char socket[108]; // "" = booth_socket_default
     } control;
+    unsigned given; // 1 << enum booth_stored: by file or override, or by geometry.ini
 };
 
-enum { BOOTH_SECTIONS = 14, BOOTH_ROWS_MOST = 256, BOOTH_DRIVERS_MOST = 16 };
+enum { BOOTH_SECTIONS = 15, BOOTH_ROWS_MOST = 256, BOOTH_DRIVERS_MOST = 16 };
 
 // The sections of boothd.conf over one booth_settings. Filled by
 // booth_tables_init; must not be copied or moved, since it points into itself.
@@ -120,7 +151,8 @@ void booth_preset(struct booth_settings *booth);
 // Loads a settings file, applies count overrides "section.key=value" in order,
 // makes paths relative to the file (in overrides: to the working folder)
 // whole, and checks what no single row can. Errors (CONFIG) name file, line,
-// key, value and what is allowed; booth is untouched on failure.
+// key, value and what is allowed; booth is untouched on failure. Where a store
+// is named, what it provides may be missing: see booth_from_store.
 bool booth_load(const char *path, const char *const *overrides, int count,
                 struct booth_settings *booth, struct error *err);
 

@@ -23,7 +23,7 @@ struct path_field {
     size_t size;
 };
 
-enum { PATH_FIELDS = 13 };
+enum { PATH_FIELDS = 14 };
 
 static void path_fields(struct booth_settings *b, struct path_field out[PATH_FIELDS])
 {
@@ -41,6 +41,7 @@ static void path_fields(struct booth_settings *b, struct path_field out[PATH_FIE
         FIELD("materials", "folder", b->materials.folder),
         FIELD("materials", "show", b->materials.show),
         FIELD("quality", "bands", b->quality.bands),
+        FIELD("calibration", "store", b->calibration.store),
         FIELD("control", "socket", b->control.socket),
 #undef FIELD
     };
@@ -73,6 +74,33 @@ static bool resolve(struct booth_settings *booth, const char *file, const char *
     return true;
 }
 
+static const struct {
+    const char *section, *key;
+} STORED[] = {
+#define X(name, section, key) {section, key},
+    BOOTH_STORED(X)
+#undef X
+};
+
+const char *booth_stored_name(enum booth_stored row)
+{
+    static const char *const names[] = {
+#define X(name, section, key) section "." key,
+        BOOTH_STORED(X)
+#undef X
+    };
+    return (unsigned)row < STORED_COUNT ? names[row] : "";
+}
+
+// The bit of a setting that the store provides, 0 of any other.
+static unsigned stored_bit(const char *section, const char *key)
+{
+    for (int i = 0; i < STORED_COUNT; i++)
+        if (!strcmp(STORED[i].section, section) && !strcmp(STORED[i].key, key))
+            return 1u << i;
+    return 0;
+}
+
 static struct settings_section *section_of(struct booth_tables *tables, const char *name)
 {
     for (struct settings_section *s = tables->sections; s->name; s++)
@@ -93,7 +121,40 @@ static bool override(struct booth_tables *tables, struct booth_settings *booth, 
         return fail(err, ERROR_CONFIG, "%s: there is no section [%s]", text, section);
     if (!settings_set(s->rows, booth, key, text + value_at, err))
         return while_doing(err, "[%s]", section);
+    booth->given |= stored_bit(section, key);
     return resolve(booth, NULL, section, key, err);
+}
+
+// What the file gives; a row that the store may provide need not be there.
+static bool load_file(const char *path, const struct booth_tables *tables,
+                      struct booth_settings *booth, struct error *err)
+{
+    bool given[BOOTH_ROWS_MOST] = {0}, *row_given = given;
+    for (const struct settings_section *s = tables->sections; s->name; s++)
+        settings_preset(s->rows, booth);
+    if (!ini_load_onto(path, tables->sections, given, err))
+        return false;
+    for (const struct settings_section *s = tables->sections; s->name; s++)
+        for (const struct setting *row = s->rows; row->name; row++, row_given++) {
+            unsigned bit = stored_bit(s->name, row->name);
+            booth->given |= *row_given ? bit : 0;
+            *row_given = *row_given || (bit && *booth->calibration.store);
+        }
+    return ini_complete(path, tables->sections, given, err);
+}
+
+// An empty name is none; lamps that neither settings nor store name lie beside the file.
+static bool preset_lamps(const char *path, struct booth_settings *b, struct error *err)
+{
+    if (!*b->display.model)
+        b->given &= ~(1u << STORED_MODEL);
+    if (*b->lamps.folder)
+        return true;
+    b->given &= ~(1u << STORED_LAMPS);
+    if (*b->calibration.store)
+        return true;
+    strcpy(b->lamps.folder, "lamps");
+    return resolve(b, path, "lamps", "folder", err);
 }
 
 // What no single row can say.
@@ -117,14 +178,14 @@ bool booth_load(const char *path, const char *const *overrides, int count,
     struct booth_settings loaded = {0};
     struct booth_tables tables;
     booth_tables_init(&tables, &loaded);
-    if (!ini_load(path, tables.sections, err))
+    if (!load_file(path, &tables, &loaded, err))
         return false;
     if (!resolve(&loaded, path, NULL, NULL, err))
         return while_doing(err, "%s", path);
     for (int i = 0; i < count; i++)
         if (!override(&tables, &loaded, overrides[i], err))
             return while_doing(err, "--set");
-    if (!check(&loaded, err))
+    if (!preset_lamps(path, &loaded, err) || !check(&loaded, err))
         return while_doing(err, "%s", path);
     *booth = loaded;
     return true;

@@ -14,7 +14,7 @@
 #include "config/paths.h"
 #include "daemon/notify.h"
 #include "daemon/options.h"
-#include "daemon/requests.h"
+#include "daemon/renew.h"
 #include "daemon/serve.h"
 #include "drivers/udev.h"
 
@@ -30,6 +30,7 @@ struct service {
     struct desk *desk;
     struct serve *serve;
     struct jobs *jobs;
+    struct renewal *renewal;
     struct mailbox snapshots;
     struct notifier notifier;
     int signals;
@@ -134,11 +135,13 @@ static bool start(struct service *s, struct error *err)
     char path[108], text[256];
     clock_utc(s->since);
     notify_init(&s->notifier);
-    if (!catch_signals(s, err) || !setup_load(&s->options.source, &s->booth.setup, err) ||
+    if (!catch_signals(s, err) ||
+        !setup_load(&s->options.source, clock_utc_s(), &s->booth.setup, err) ||
         !socket_path(s, path, sizeof path, err) || !open_renderer(&s->booth, err))
         return false;
     s->jobs = jobs_create(err);
-    if (!s->jobs || !start_instruments(s, err))
+    s->renewal = s->jobs ? renewal_begin(&s->booth, &s->options.source, err) : NULL;
+    if (!s->renewal || !start_instruments(s, err))
         return false;
     if (!mailbox_init(&s->snapshots, sizeof(struct snapshot)))
         return fail(err, ERROR_SYSTEM, "no memory for the status");
@@ -164,6 +167,7 @@ static bool stop(struct service *s)
     int64_t deadline_ns = clock_now_ns() + STOP_WITHIN_NS;
     notify_stopping();
     serve_stop(s->serve);
+    renewal_end(s->renewal);
     bool clean = desk_close(s->desk, deadline_ns);
     if (!clean || !acquire_stop(s->booth.instruments, deadline_ns)) {
         log_line(LOG_LEVEL_WARNING, "an instrument did not answer in time and is left as it is");
@@ -222,6 +226,7 @@ static void loop(struct service *s)
         poll(waiting, 2, TICK_MS);
         take_signals(s);
         do_jobs(s);
+        renewal_step(s->renewal, clock_now_ns(), clock_utc_s());
         complain(s, draw(s, false, &err), &err);
         notify_alive(&s->notifier, clock_now_ns(), !s->booth.blind);
         if (!renderer_events(s->booth.renderer, 0))
@@ -276,7 +281,7 @@ static int check(const struct boothd_options *options)
     struct setup *setup;
     char text[256];
     int missing = 0;
-    if (!setup_load(source, &setup, &err))
+    if (!setup_load(source, clock_utc_s(), &setup, &err))
         return exit_code(&err);
     bool fine = (check_calibration(&setup->settings, &err) &&
                  check_socket(options, &setup->settings, &err)) ||

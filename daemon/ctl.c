@@ -350,6 +350,11 @@ static void print_status(const json_t *s, FILE *out)
     if (json_is_object(display))
         fprintf(out, "display        %s, condition %.1f\n", text(display, "model"),
                 real(display, "condition"));
+    const json_t *calibration = json_object_get(s, "calibration");
+    if (json_is_integer(json_object_get(calibration, "version")))
+        fprintf(out, "calibration    %04d of %s: %s\n",
+                (int)json_integer_value(json_object_get(calibration, "version")),
+                text(calibration, "created"), text(calibration, "note"));
     fprintf(out, "proof          %s\n",
             json_is_true(json_object_get(s, "valid")) ? "valid" : "not valid now");
 }

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/clock.h"
 #include "base/log.h"
 #include "render/reference.h"
 
@@ -137,21 +138,19 @@ static void take_back(struct booth *b, struct setup *old, const struct estimator
     frame(b, now_ns, true, NULL);
 }
 
-bool booth_reload(struct booth *b, const struct setup_source *source, int64_t now_ns,
-                  json_t **restart, struct error *err)
+bool booth_take(struct booth *b, struct setup *next, int64_t now_ns, json_t **restart,
+                struct error *err)
 {
-    struct setup *next, *old = b->setup;
+    struct setup *old = b->setup;
     struct estimator before = b->estimator;
     struct classifier taught;
-    if (!setup_reload(source, old, &next, err))
-        return while_doing(err, "reload");
     json_t *changed = json_array();
     keep_given(&old->settings, &next->settings, changed);
     forget_frame(b);
     b->setup = next;
     lamps_teach(&next->lamps, &taught);
     estimator_change(&b->estimator, &next->settings, &taught);
-    bool fine = frame(b, now_ns, true, err) || while_doing(err, "reload");
+    bool fine = frame(b, now_ns, true, err);
     if (fine)
         setup_free(old);
     else
@@ -160,6 +159,15 @@ bool booth_reload(struct booth *b, const struct setup_source *source, int64_t no
         *restart = json_incref(changed);
     json_decref(changed);
     return fine;
+}
+
+bool booth_reload(struct booth *b, const struct setup_source *source, int64_t now_ns,
+                  json_t **restart, struct error *err)
+{
+    struct setup *next;
+    return (setup_reload(source, clock_utc_s(), b->setup, &next, err) &&
+            booth_take(b, next, now_ns, restart, err)) ||
+           while_doing(err, "reload");
 }
 
 static void reload(struct booth *b, const struct setup_source *source, struct job *job,

@@ -18,4 +18,9 @@ void request_do(struct booth *booth, const struct setup_source *source, struct j
 bool booth_reload(struct booth *booth, const struct setup_source *source, int64_t now_ns,
                   json_t **restart, struct error *err);
 
+// The second half of it: puts what was loaded (taken over in any case) in the
+// place of what is in force.
+bool booth_take(struct booth *booth, struct setup *next, int64_t now_ns, json_t **restart,
+                struct error *err);
+
 #endif

@@ -27,6 +27,8 @@ static bool load_display(struct setup *s, struct error *err)
 static bool declared_is_there(const struct setup *s, struct error *err)
 {
     const char *declared = s->settings.lamps.declared;
+    if (s->calibration.used && !s->calibration.number) // it is to be calibrated yet
+        return true;
     for (int i = 0; i < s->lamps.count; i++)
         if (!strcmp(declared, s->lamps.lamps[i].file.name))
             return true;
@@ -94,18 +96,46 @@ static bool consistent(const struct setup *s, const char *path, struct error *er
            while_doing(err, "%s", path);
 }
 
-bool setup_reload(const struct setup_source *source, const struct setup *old, struct setup **out,
-                  struct error *err)
+bool setup_age(struct setup *s, int64_t utc_s)
+{
+    bool before = s->expired;
+    s->expired = s->calibration.number && store_expired(&s->calibration.manifest, utc_s);
+    return s->expired != before;
+}
+
+// At the start the daemon goes on without a calibration that is no good: a
+// new one is measured through it.
+static bool take_calibration(struct setup *s, int64_t utc_s, bool start, struct error *err)
+{
+    struct error why = {0};
+    if (!booth_from_store(&s->settings, utc_s, &s->calibration, &why)) {
+        fail(&s->refused, why.code, "calibration refused: %s", why.text);
+        if (!start)
+            return fail(err, s->refused.code, "%s", s->refused.text);
+    }
+    s->unplaced = !booth_is_placed(&s->settings);
+    setup_age(s, utc_s);
+    return true;
+}
+
+static bool load(struct setup *s, const struct setup_source *source, int64_t utc_s,
+                 const struct setup *old, struct error *err)
+{
+    return booth_load(source->path, source->overrides, source->override_count, &s->settings, err) &&
+           booth_bands(&s->settings, &s->bands, err) && take_calibration(s, utc_s, !old, err) &&
+           load_display(s, err) && load_lamps(s, err) && consistent(s, source->path, err) &&
+           (show_again(s, old, err) || while_doing(err, "%s", source->path));
+}
+
+bool setup_reload(const struct setup_source *source, int64_t utc_s, const struct setup *old,
+                  struct setup **out, struct error *err)
 {
     struct setup *s = calloc(1, sizeof *s);
     if (!s)
         return fail(err, ERROR_SYSTEM, "no memory for the setup");
     s->baked_lamp = -1;
     s->generations = old ? old->generations : 0;
-    if (booth_load(source->path, source->overrides, source->override_count, &s->settings, err) &&
-        booth_bands(&s->settings, &s->bands, err) && load_display(s, err) && load_lamps(s, err) &&
-        consistent(s, source->path, err) &&
-        (show_again(s, old, err) || while_doing(err, "%s", source->path))) {
+    if (load(s, source, utc_s, old, err)) {
         *out = s;
         return true;
     }
@@ -113,9 +143,19 @@ bool setup_reload(const struct setup_source *source, const struct setup *old, st
     return false;
 }
 
-bool setup_load(const struct setup_source *source, struct setup **out, struct error *err)
+bool setup_load(const struct setup_source *source, int64_t utc_s, struct setup **out,
+                struct error *err)
 {
-    return setup_reload(source, NULL, out, err);
+    return setup_reload(source, utc_s, NULL, out, err);
+}
+
+void setup_renumber(struct setup *s, uint64_t last)
+{
+    s->generations = last;
+    s->display_generation = ++s->generations;
+    s->lights_generation = s->generations + 1;
+    s->generations += s->lamps.count;
+    s->texels_generation = ++s->generations;
 }
 
 static void forget_bake(struct setup *s)
@@ -169,6 +209,14 @@ static bool bake(struct setup *s, int lamp, struct error *err)
     return true;
 }
 
+bool setup_bake_for(struct setup *s, const char *lamp, struct error *err)
+{
+    for (int i = 0; s->show == SHOW_MATERIAL && i < s->lamps.count; i++)
+        if (!strcmp(s->lamps.lamps[i].file.name, lamp))
+            return bake(s, i, err);
+    return true;
+}
+
 static void lay_material(const struct setup *s, struct scene *out)
 {
     const struct material *m = &s->material;
@@ -182,11 +230,16 @@ static void lay_material(const struct setup *s, struct scene *out)
     out->white = s->white;
 }
 
+static bool too_old(const struct setup *s)
+{
+    return s->expired && s->settings.calibration.expired == EXPIRED_REFUSE;
+}
+
 static bool can_proof(const struct setup *s, const struct state *state)
 {
     int lamp = state->lamp.index;
-    return s->show == SHOW_MATERIAL && s->has_display && lamp >= 0 && lamp < s->lamps.count &&
-           s->lights[lamp].count > 0;
+    return s->show == SHOW_MATERIAL && s->has_display && !s->unplaced && !too_old(s) && lamp >= 0 &&
+           lamp < s->lamps.count && s->lights[lamp].count > 0;
 }
 
 bool setup_scene(struct setup *s, const struct state *state, struct scene *out, struct error *err)
@@ -228,9 +281,48 @@ static bool lamp_without_map(const struct setup *s, int index, char *text, size_
     return false;
 }
 
+// "stand.hinge_m, tracker.place_m".
+static void overruled_rows(unsigned rows, char *text, size_t size)
+{
+    size_t used = 0;
+    *text = 0;
+    for (unsigned i = 0; i < STORED_COUNT && used < size; i++)
+        if (rows & 1u << i)
+            used +=
+                snprintf(text + used, size - used, "%s%s", used ? ", " : "", booth_stored_name(i));
+}
+
+static bool calibration_warning(const struct setup *s, int *index, char *text, size_t size)
+{
+    const struct booth_calibration *c = &s->calibration;
+    if (s->refused.code && (*index)-- == 0) {
+        snprintf(text, size, "%s", s->refused.text);
+        return true;
+    }
+    if (s->expired && (*index)-- == 0) {
+        snprintf(text, size, "the calibration has expired%s: it was valid until %s",
+                 too_old(s) ? " and is refused" : "", c->manifest.valid_until);
+        return true;
+    }
+    if (c->used && !c->named && (*index)-- == 0) {
+        snprintf(text, size, "the store holds no calibration yet: %s",
+                 s->settings.calibration.store);
+        return true;
+    }
+    if (c->overruled && (*index)-- == 0) {
+        char rows[160];
+        overruled_rows(c->overruled, rows, sizeof rows);
+        snprintf(text, size, "the settings' own count instead of the calibration's: %s", rows);
+        return true;
+    }
+    return false;
+}
+
 bool setup_warning(const struct setup *s, int index, char *text, size_t size)
 {
     const struct booth_settings *b = &s->settings;
+    if (calibration_warning(s, &index, text, size))
+        return true;
     if (!s->has_display && index-- == 0) {
         if (*b->display.model)
             snprintf(text, size, "the display model %s is not there yet", b->display.model);
@@ -250,7 +342,8 @@ bool setup_warning(const struct setup *s, int index, char *text, size_t size)
         return true;
     }
     if (!s->lamps.count && index-- == 0) {
-        snprintf(text, size, "no lamp was taught yet in %s", b->lamps.folder);
+        snprintf(text, size, "no lamp was taught yet in %s",
+                 *b->lamps.folder ? b->lamps.folder : "the store");
         return true;
     }
     return lamp_without_map(s, index, text, size);

@@ -5,6 +5,7 @@
 #ifndef DAEMON_SETUP_H
 #define DAEMON_SETUP_H
 
+#include "config/booth_store.h"
 #include "config/lamps.h"
 #include "config/materials.h"
 #include "daemon/state.h"
@@ -23,6 +24,10 @@ enum show_kind { SHOW_NOTHING, SHOW_PATCH, SHOW_MATERIAL };
 
 struct setup {
     struct booth_settings settings;
+    struct booth_calibration calibration; // of the store
+    struct error refused; // why a calibration of the store is not in force; code NONE while it is
+    bool unplaced;        // nobody says where the screen is
+    bool expired;         // the calibration in force may be used no longer
     struct band_set bands;
     bool has_display;
     struct display_model display;
@@ -46,12 +51,27 @@ struct setup {
 
 // Loads settings, display model, lamps and the material to start with. What is
 // named but not there yet (display model file, lamp folder) is left out; what
-// is there but wrong is an error. setup is untouched on failure.
-bool setup_load(const struct setup_source *source, struct setup **out, struct error *err);
+// is there but wrong is an error. A calibration of the store that cannot be used
+// is left out too, and `refused` says why. setup is untouched on failure. utc_s:
+// see clock_utc_s.
+bool setup_load(const struct setup_source *source, int64_t utc_s, struct setup **out,
+                struct error *err);
 
-// As setup_load, keeping what is on show; generations go on from old's.
-bool setup_reload(const struct setup_source *source, const struct setup *old, struct setup **out,
-                  struct error *err);
+// As setup_load, keeping what is on show; generations go on from old's. A
+// calibration that cannot be used is an error here. Of old, only show, the names
+// and counts of what is shown, and generations are read.
+bool setup_reload(const struct setup_source *source, int64_t utc_s, const struct setup *old,
+                  struct setup **out, struct error *err);
+
+// Bakes what is on show for the lamp of that name, so that the first frame need not.
+bool setup_bake_for(struct setup *setup, const char *lamp, struct error *err);
+
+// Gives everything loaded new generations, from the one after `last` on.
+void setup_renumber(struct setup *setup, uint64_t last);
+
+// Looks whether the calibration has expired. True when that has changed.
+bool setup_age(struct setup *setup, int64_t utc_s);
+
 void setup_free(struct setup *setup); // accepts NULL
 
 // What to show from now on. Unchanged on failure. patch "" = whole material.

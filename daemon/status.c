@@ -124,6 +124,9 @@ static void take_setup(const struct setup *u, struct snapshot *s)
     if (u->has_display)
         memcpy(s->display, u->display.name, sizeof s->display);
     s->condition = u->has_display ? u->display.condition : 0;
+    s->calibration = u->calibration;
+    s->expired = u->expired;
+    s->refused = u->refused;
     int lamp = s->state.lamp.index;
     if (lamp >= 0 && lamp < u->lamps.count)
         memcpy(s->lamp_name, u->lamps.lamps[lamp].file.name, sizeof s->lamp_name);
@@ -319,6 +322,36 @@ static json_t *eye_json(const struct snapshot *s)
     return eye;
 }
 
+static json_t *overruled_json(unsigned rows)
+{
+    json_t *out = json_array();
+    for (unsigned i = 0; i < STORED_COUNT; i++)
+        if (rows & 1u << i)
+            json_array_append_new(out, json_string(booth_stored_name(i)));
+    return out;
+}
+
+static json_t *calibration_json(const struct snapshot *s)
+{
+    const struct booth_calibration *c = &s->calibration;
+    const struct store_manifest *m = &c->manifest;
+    if (!c->used)
+        return json_null();
+    json_t *out =
+        json_pack("{s:s, s:o, s:b, s:o, s:o}", "store", s->settings.calibration.store, "version",
+                  c->number ? json_integer(c->number) : json_null(), "expired", s->expired,
+                  "refused", text_or_null(s->refused.code ? s->refused.text : ""), "overruled",
+                  overruled_json(c->overruled));
+    if (!c->number)
+        return out;
+    json_t *facts = json_pack("{s:s, s:o, s:s, s:s, s:s}", "created", m->created, "valid_until",
+                              text_or_null(m->valid_until), "software", m->software, "note",
+                              m->note, "sha256", c->sum.hex);
+    json_object_update(out, facts);
+    json_decref(facts);
+    return out;
+}
+
 json_t *status_json(const struct snapshot *s, const struct instruments_report *instruments,
                     const char *since, int64_t now_ns)
 {
@@ -342,6 +375,7 @@ json_t *status_json(const struct snapshot *s, const struct instruments_report *i
                             ? json_pack("{s:s, s:s, s:f}", "model", s->display, "file",
                                         s->settings.display.model, "condition", s->condition)
                             : json_null());
+    json_object_set_new(out, "calibration", calibration_json(s));
     json_object_set_new(out, "warnings", warnings_json(s));
     json_object_set_new(out, "settings", settings_json(s));
     return out;

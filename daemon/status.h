@@ -29,6 +29,9 @@ struct snapshot {
     bool has_display;
     char display[128];
     double condition;
+    struct booth_calibration calibration;
+    bool expired;         // it is past its time
+    struct error refused; // of a calibration; code NONE while the store's own is in force
     char warnings[WARNINGS_MOST][200]; // "" ends them
 };
 

@@ -17,7 +17,8 @@
 bool ini_load(const char *path, const struct settings_section *sections, struct error *err);
 
 // As ini_load, but a field that the file does not name keeps its value, and
-// none must be named: ini_missing says so. given (may be NULL) has an element
+// none must be named: ini_complete says what is
+// missing. given (may be NULL) has an element
 // for every row of every section, in their order; those the file names become
 // true, the others stay.
 bool ini_load_onto(const char *path, const struct settings_section *sections, bool *given,

@@ -16,7 +16,7 @@
 #include "tests/fakes/folder.h"
 
 #ifdef __SANITIZE_ADDRESS__
-enum { KILLS = 60 };
+enum { KILLS = 200 };
 #else
 enum { KILLS = 1000 };
 #endif
