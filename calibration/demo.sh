@@ -45,7 +45,6 @@ if [ "$1" = --inside ]; then
     "$programs/boothctl" --socket "$run/boothd.sock" quit >/dev/null
     wait "$daemon"
     daemon=
-    cp "$run/display.ini" "$out/display.ini"
     exit $status
 fi
 
@@ -54,9 +53,13 @@ out=$(cd "$1" && pwd)
 shift
 run=$out/run
 rm -rf "$run"
-mkdir -p "$run/lamps"
-sed "s|^folder = lamps|folder = $run/lamps|" "$root/config/booths/emulated.conf" >"$run/boothd.conf"
+mkdir -p "$run"
+# Lamps and display model come from the store, which the session fills.
+sed -e '/^folder = lamps$/d' -e 's|^model = display.ini$|serial = emulated panel EMU001|' \
+    "$root/config/booths/emulated.conf" >"$run/boothd.conf"
 cat >>"$run/boothd.conf" <<END
+[calibration]
+store = $run/store
 
 [materials]
 folder = $root/config/materials

@@ -114,6 +114,8 @@ static bool check_paths(struct session *s, const struct options *o, struct error
         return false;
     if (access(s->out, W_OK))
         return fail_errno(err, "%s", s->out);
+    if (!session_store_begin(s, err))
+        return false;
     if (!*s->settings.display.model)
         return fail(err, ERROR_CONFIG, "%s: [display] model: names no file to fit into", o->config);
     for (int i = 0; i < s->facts->lamp_count; i++) {
@@ -158,7 +160,7 @@ static bool steps(struct session *s, struct error *err)
             return false;
         bench_progress(&s->bench, "lamps", i + 1, f->lamp_count);
     }
-    if (!bench_reload(&s->bench, err))
+    if (!session_store(s, STAGE_TAUGHT, err) || !bench_reload(&s->bench, err))
         return false;
     say(s, "Characterising the display in the dark booth");
     if (!session_characterise(s, err))
@@ -190,7 +192,7 @@ static bool run(struct session *s, const struct options *o, struct error *err)
                          json_is_true(json_object_get(s->facts->settings, "emulated"));
     clock_utc(s->facts->finished);
     s->facts->seconds = (double)(clock_now_ns() - began) / 1e9;
-    if (!report_save(s->facts, s->out, err))
+    if (!report_save(s->facts, s->out, err) || !session_store(s, STAGE_REPORTED, err))
         return false;
     report_as_text(s->facts, stdout);
     printf("\n%s/report.html\n", s->out);

@@ -7,6 +7,7 @@
 #include "calibration/bench.h"
 #include "calibration/facts.h"
 #include "config/booth.h"
+#include "config/store.h"
 
 struct session {
     struct bench bench;
@@ -17,10 +18,24 @@ struct session {
     const char *material;  // chart to proof
     bool rehearse;         // few patches only: shows that the chain works
     double lamp_drift;     // relative change per minute of a lamp that stands still, 0 = the plan's
+    bool stored;           // the settings name a store of calibrations
+    struct store_place store;
 };
 
 // Path of the luminance map of lamp i.
 void session_map(const struct session *s, int lamp, char *path, size_t size);
+
+// Where the settings name a store, makes sure that it can take a new version, and
+// lets lamps and display model go to the results' folder where the settings name
+// no place of their own for them.
+bool session_store_begin(struct session *s, struct error *err);
+
+// What a version of the store is made after.
+enum session_stage { STAGE_TAUGHT, STAGE_CHARACTERISED, STAGE_REPORTED };
+
+// Makes what the session has so far a new version of the store, if there is one,
+// and puts it in force. It is valid anew from the second stage on.
+bool session_store(struct session *s, enum session_stage stage, struct error *err);
 
 // Teaches lamp i from live readings, scales its luminance map by spot readings
 // and writes what was taught (not the map itself) into boothd's lamp folder.

@@ -87,6 +87,7 @@ bool session_characterise(struct session *s, struct error *err)
     snprintf(verify_path, sizeof verify_path, "%s/verify.ti3", s->out);
     snprintf(d->model, sizeof d->model, "%s", s->settings.display.model);
     bool fine = bench_lamp(&s->bench, "none", err) && bench_await_lamp(&s->bench, "", 30, err) &&
-                measure(s, verify_path, err) && fit_model(s, verify_path, err) && bench_reload(&s->bench, err);
+                measure(s, verify_path, err) && fit_model(s, verify_path, err) &&
+                session_store(s, STAGE_CHARACTERISED, err) && bench_reload(&s->bench, err);
     return fine || while_doing(err, "characterising the display");
 }
