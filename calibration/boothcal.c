@@ -19,6 +19,11 @@ static const struct command FAMILIES[] = {
      "what the spectrometer alone can tell of a booth's lamps"},
     {"list", command_list, "[--config FILE] [--json] | --udev",
      "instruments found, their serial numbers and permissions; the udev rules"},
+    {"history", command_history, "--config FILE [--verify] [--json]",
+     "the calibrations of a booth and its display in the store"},
+    {"diff", command_diff, "--config FILE A [B] [--json]",
+     "by how much two of them differ: CIEDE2000, per cent, metres"},
+    {"use", command_use, "--config FILE N", "puts one of them in force"},
     {NULL, NULL, NULL, NULL},
 };
 

@@ -17,6 +17,9 @@
 #include <stdint.h>
 
 #include <cmocka.h>
+#undef fail // ours is a function
+
+#include "config/store.h"
 
 #ifdef __SANITIZE_ADDRESS__
 #define OPTION "--rehearse"
@@ -163,6 +166,27 @@ static void the_files_of_the_session_are_there(void **state)
     }
 }
 
+static void the_results_are_a_sound_calibration_in_the_store(void **state)
+{
+    (void)state;
+    static const char *const PATHS[] = {"display.ini",  "display.ti3", "verify.ti3",
+                                        "lamps/D50.sp", "report.json", "lamps/D65.exr"};
+    struct store_place place;
+    struct store_version v;
+    struct error err = {0};
+    char store[64];
+    int number = 0;
+    snprintf(store, sizeof store, "%s/run/store", folder);
+    assert_true(store_place(store, "emulated booth", "emulated panel EMU001", &place, &err));
+    assert_true(store_current(&place, &number, &err));
+    if (!store_open(&place, number, &v, &err))
+        print_error("%s\n", err.text);
+    assert_int_equal(err.code, ERROR_NONE);
+    for (size_t i = 0; i < sizeof PATHS / sizeof *PATHS; i++)
+        assert_non_null(store_sum(&v, PATHS[i]));
+    store_version_fini(&v);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -172,6 +196,7 @@ int main(void)
         cmocka_unit_test(tilt_and_eye_are_seen_where_they_are),
         cmocka_unit_test(every_reading_is_kept_and_labelled_as_emulated),
         cmocka_unit_test(the_files_of_the_session_are_there),
+        cmocka_unit_test(the_results_are_a_sound_calibration_in_the_store),
     };
     return cmocka_run_group_tests(tests, a_rehearsed_session, cleared);
 }
