@@ -33,7 +33,9 @@
 #define CONTROL_AIM "aim"   // target "screen" x_px y_px | "ceiling" x_m z_m
 #define CONTROL_TRUTH                                                                              \
     "truth" // reflectance {nm, values} or flat -> XYZ a physical sample would show
-#define CONTROL_FAULT "fault" // instrument, kind
+#define CONTROL_FAULT "fault"           // instrument, kind
+#define CONTROL_PROTRACTOR "protractor" // -> deg, the screen's tilt as a protractor reads it
+#define CONTROL_TAPE "tape"             // x_m, y_m on the screen -> point_m as a tape measures it
 #define CONTROL_PHOTOGRAPH                                                                         \
     "photograph" // folder -> an exposure series of the ceiling in it
 

@@ -55,6 +55,12 @@ static const struct setting ceiling_rows[] = {
      "Depth of the ceiling, front to back."},
     {0}};
 
+static const struct setting accelerometer_rows[] = {
+    {"turned_deg", SETTING_VECTOR, AT(accelerometer.turned_deg), 3, -80, 80, "deg", NULL, "0 0 0",
+     "How the sensor is turned on the screen: about the screen's right, then its own up, then its "
+     "own out (boothcal tilt finds it)."},
+    {0}};
+
 static const struct setting tracker_rows[] = {
     {"place_m", SETTING_VECTOR, AT(tracker.place_m), 3, -20, 20, "m", NULL, "0 0 0",
      "Place of the camera in the booth."},
@@ -242,7 +248,7 @@ void booth_tables_init(struct booth_tables *tables, struct booth_settings *booth
                    AT(spectrometer.options), NULL);
     driver_section(&g, "accelerometer", AT(accelerometer.driver),
                    accelerometer_names(tables->drivers[1]), accelerometer_settings,
-                   AT(accelerometer.options), NULL);
+                   AT(accelerometer.options), accelerometer_rows);
     driver_section(&g, "tracker", AT(tracker.driver), tracker_names(tables->drivers[2]),
                    tracker_settings, AT(tracker.options), tracker_rows);
     driver_section(&g, "radiometer", AT(radiometer.driver), radiometer_names(tables->drivers[3]),

@@ -31,6 +31,7 @@ enum expired_rule { EXPIRED_REFUSE, EXPIRED_WARN };
     X(LAMPS, "lamps", "folder")                                                                    \
     X(HINGE, "stand", "hinge_m") /* from here on of geometry.ini */                                \
     X(CENTRE, "stand", "centre_from_hinge_m")                                                      \
+    X(TURNED, "accelerometer", "turned_deg")                                                       \
     X(PLACE, "tracker", "place_m")                                                                 \
     X(PITCH, "tracker", "pitch_deg")                                                               \
     X(YAW, "tracker", "yaw_deg")                                                                   \
@@ -82,6 +83,7 @@ struct booth_settings {
     struct {
         int driver;
         struct accelerometer_options options;
+        double turned_deg[3]; // see tilt_of_turned
     } accelerometer;
     struct {
         int driver;

@@ -7,21 +7,20 @@
 
 enum { SECTIONS_MOST = STORED_COUNT + 2, ROWS_MOST = 2 * STORED_COUNT + 2, GIVEN_MOST = 64 };
 
-#define KNOWN(field, type, count, unit, sentence)                                                  \
+#define KNOWN(field, type, count, unit, preset)                                                    \
     {                                                                                              \
 #field, type, offsetof(struct geometry_uncertainty, field), count, 0, 1000, unit, NULL,    \
-            (count) ? "0 0 0" : "0", sentence                                                      \
+            preset, "Expanded uncertainty, k = 2."                                                 \
     }
-#define VECTOR(field) KNOWN(field, SETTING_VECTOR, 3, "m", "Expanded uncertainty, k = 2.")
-#define ANGLE(field) KNOWN(field, SETTING_DOUBLE, 0, "deg", "Expanded uncertainty, k = 2.")
 
 static const struct setting uncertainty_rows[] = {
-    VECTOR(hinge_m),
-    VECTOR(centre_from_hinge_m),
-    VECTOR(place_m),
-    ANGLE(pitch_deg),
-    ANGLE(yaw_deg),
-    ANGLE(roll_deg),
+    KNOWN(hinge_m, SETTING_VECTOR, 3, "m", "0 0 0"),
+    KNOWN(centre_from_hinge_m, SETTING_VECTOR, 3, "m", "0 0 0"),
+    KNOWN(turned_deg, SETTING_VECTOR, 3, "deg", "0 0 0"),
+    KNOWN(place_m, SETTING_VECTOR, 3, "m", "0 0 0"),
+    KNOWN(pitch_deg, SETTING_DOUBLE, 0, "deg", "0"),
+    KNOWN(yaw_deg, SETTING_DOUBLE, 0, "deg", "0"),
+    KNOWN(roll_deg, SETTING_DOUBLE, 0, "deg", "0"),
     {0},
 };
 

@@ -9,7 +9,7 @@
 
 // How well the rows are known, k = 2, in the units of the rows; 0 = not fitted.
 struct geometry_uncertainty {
-    double hinge_m[3], centre_from_hinge_m[3];
+    double hinge_m[3], centre_from_hinge_m[3], turned_deg[3];
     double place_m[3], pitch_deg, yaw_deg, roll_deg;
 };
 

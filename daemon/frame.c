@@ -63,9 +63,8 @@ static bool failed(const struct booth *b, struct error *err)
 
 bool frame(struct booth *b, int64_t now_ns, bool force, struct error *err)
 {
-    struct samples seen;
-    acquire_latest(b->instruments, &seen);
-    b->state = estimate(&b->estimator, &seen, now_ns);
+    acquire_latest(b->instruments, &b->seen);
+    b->state = estimate(&b->estimator, &b->seen, now_ns);
     struct state visible = still(&b->shown, &b->state);
     bool other_lamp = visible.lamp.index != b->shown.lamp.index;
     if (b->failure.code && !force && !other_lamp && now_ns < b->again_ns)

@@ -12,6 +12,7 @@ struct booth {
     struct setup *setup;
     struct renderer *renderer;
     struct estimator estimator;
+    struct samples seen;  // what the instruments said last
     struct state state;   // believed now
     struct state shown;   // of the last frame drawn
     struct scene scene;   // of the last frame, pointers into setup

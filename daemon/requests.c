@@ -101,7 +101,8 @@ static bool counts_at_start_only(const char *section, const char *key)
     snprintf(whole, sizeof whole, "%s.%s", section, key);
     for (size_t i = 0; i < sizeof sections / sizeof *sections; i++)
         if (!strcmp(section, sections[i]))
-            return strcmp(whole, "screen.width_m") && strcmp(whole, "screen.height_m");
+            return strcmp(whole, "screen.width_m") && strcmp(whole, "screen.height_m") &&
+                   strcmp(whole, "accelerometer.turned_deg");
     for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
         if (!strcmp(whole, keys[i]))
             return true;

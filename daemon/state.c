@@ -28,6 +28,7 @@ static void limit(struct estimator *e, const struct booth_settings *settings,
 {
     e->limits = settings->state;
     e->booth_from_tracker = booth_from_tracker(settings);
+    memcpy(e->turned_deg, settings->accelerometer.turned_deg, sizeof e->turned_deg);
     e->classifier = *taught;
     classifier_reset(&e->classifier);
     e->classifier.dark_lux = settings->state.dark_lux;
@@ -175,7 +176,7 @@ static void take_tilt(struct estimator *e, const struct samples *seen, int64_t n
         e->tilt.usable = false;
         return;
     }
-    double off = turn(t->tilt_deg - e->state.tilt.deg);
+    double off = turn(tilt_of_turned(t->tilt_deg, e->turned_deg) - e->state.tilt.deg);
     double dt_s = fmin(fmax(seconds(t->taken.latest_ns - e->tilt.seen_ns), 0.001), 0.1);
     bool rests = e->tilt.ever && fabs(off) < TILT_STEP_DEG && e->limits.tilt_s > 0;
     double share = rests ? -expm1(-dt_s / e->limits.tilt_s) : 1;

@@ -70,6 +70,7 @@ struct estimator {
     struct state_settings limits;
     struct classifier classifier;
     struct rigid booth_from_tracker;
+    double turned_deg[3]; // of the inclinometer on the screen
     int64_t now_ns; // of the last call
     struct memory lamp, tilt, eye;
     struct state state;
@@ -96,7 +97,7 @@ void estimator_change(struct estimator *e, const struct booth_settings *settings
 // - Level: averaged from the first reading on, then smoothed over level_s; two
 //   readings in a row more than 3 % off on the same side are a dimmer's work
 //   and count at once.
-// - Tilt: smoothed over tilt_s while within 0.3 degrees, else taken at once;
+// - Tilt: the reading, less how the sensor is turned, smoothed over tilt_s while within 0.3 degrees, else taken at once;
 //   implausible samples are passed over.
 // - Eye: smoothed and carried on to the time of the frame's light (eye.h); lost
 //   or ambiguous markers keep the last place.

@@ -2,7 +2,6 @@
 #include "daemon/status.h"
 
 #include <math.h>
-
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -140,7 +139,11 @@ void snapshot_take(struct booth *b, struct snapshot *s)
                           .frames = b->frames,
                           .failure = b->failure,
                           .matches = !b->failure.code && b->shown.lamp.index == b->state.lamp.index,
-                          .output = renderer_output(b->renderer)};
+                          .output = renderer_output(b->renderer),
+                          .tilt_number = b->seen.tilt_number,
+                          .head_number = b->seen.head_number,
+                          .tilt = b->seen.tilt,
+                          .head = b->seen.head};
     take_setup(b->setup, s);
     snprintf(s->renderer, sizeof s->renderer, "%s", renderer_name(b->renderer));
     if (s->scene == SCENE_SURFACE)
@@ -310,7 +313,15 @@ json_t *status_shown(const struct snapshot *s)
 static json_t *tilt_json(const struct snapshot *s)
 {
     json_t *tilt = belief_json(&s->state.tilt.belief);
+    struct vec3 g = s->tilt.gravity;
+    bool any = s->tilt_number && isfinite(s->tilt.tilt_deg);
     json_object_set_new(tilt, "tilt_deg", json_real(s->state.tilt.deg));
+    json_object_set_new(tilt, "number", json_integer((json_int_t)s->tilt_number));
+    json_object_set_new(tilt, "reading_deg", any ? json_real(s->tilt.tilt_deg) : json_null());
+    json_object_set_new(tilt, "plausible", json_boolean(any && s->tilt.plausible));
+    json_object_set_new(tilt, "gravity_m_s2",
+                        any && vec3_length(g) > 0 ? json_pack("[f,f,f]", g.x, g.y, g.z)
+                                                  : json_null());
     return tilt;
 }
 
@@ -318,7 +329,12 @@ static json_t *eye_json(const struct snapshot *s)
 {
     json_t *eye = belief_json(&s->state.eye.belief);
     struct vec3 at = s->state.eye.at;
+    bool seen = s->head_number && s->head.status == TRACKER_SEEN;
+    struct vec3 there = s->head.eye;
     json_object_set_new(eye, "eye_m", json_pack("[f,f,f]", at.x, at.y, at.z));
+    json_object_set_new(eye, "number", json_integer((json_int_t)s->head_number));
+    json_object_set_new(eye, "tracker_m",
+                        seen ? json_pack("[f,f,f]", there.x, there.y, there.z) : json_null());
     return eye;
 }
 

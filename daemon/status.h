@@ -14,6 +14,9 @@ enum { WARNINGS_MOST = 16 };
 struct snapshot {
     struct booth_settings settings;
     struct state state;
+    uint64_t tilt_number, head_number; // of the samples beside: 0 = none yet
+    struct tilt_sample tilt;
+    struct head_sample head;
     char lamp_name[64]; // of the lamp proofed under, "" = none
     int lamps;          // taught
     enum scene_kind scene;

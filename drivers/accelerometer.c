@@ -77,6 +77,26 @@ double tilt_wrap(double deg)
     return deg - 360 * rint(deg / 360);
 }
 
+struct vec3 tilt_gravity_turned(double tilt_deg, const double turned_deg[3])
+{
+    const double rad = M_PI / 180;
+    struct vec3 up = {0, sin(tilt_deg * rad), cos(tilt_deg * rad)}; // screen's axes
+    struct mat3 screen_from_sensor = mat3_mul(
+        mat3_rotation(0, turned_deg[0] * rad),
+        mat3_mul(mat3_rotation(1, turned_deg[1] * rad), mat3_rotation(2, turned_deg[2] * rad)));
+    return mat3_apply(mat3_transpose(screen_from_sensor), up);
+}
+
+// With f = tilt + a, turned as a, b, c: y = sin b sin c cos f + cos c sin f and
+// z = cos b cos f are what the sensor reads as y / z = tan r.
+double tilt_of_turned(double reading_deg, const double turned_deg[3])
+{
+    const double rad = M_PI / 180;
+    double r = reading_deg * rad, b = turned_deg[1] * rad, c = turned_deg[2] * rad;
+    double f = atan2((cos(b) * sin(r) - sin(b) * sin(c) * cos(r)) / cos(c), cos(r));
+    return tilt_wrap(f / rad - turned_deg[0]);
+}
+
 const char *tilt_doubt_text(enum tilt_doubt doubt)
 {
     switch (doubt) {

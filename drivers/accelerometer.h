@@ -83,6 +83,19 @@ bool accelerometer_axes(const double accel_axes[3], int out[3], struct error *er
 // The sensor's vector along the screen's axes.
 struct vec3 accelerometer_turn(const int axes[3], struct vec3 sensor);
 
+// How a sensor is turned on the screen: from the screen's axes about their right
+// by the first angle, then about its own up by the second, then about its own
+// out by the third, degrees, right-handed.
+//
+// The unit vector of gravity's opposite in such a sensor's axes, at a tilt of
+// the screen; turned as 0 0 0 gives (0, sin tilt, cos tilt).
+struct vec3 tilt_gravity_turned(double tilt_deg, const double turned_deg[3]);
+
+// The screen's tilt from the tilt that such a sensor reads: the inverse of
+// tilt_of_gravity(tilt_gravity_turned(tilt, turned)), -180..180. The second and third
+// angle must be within -80..80.
+double tilt_of_turned(double reading_deg, const double turned_deg[3]);
+
 // Fills plausible and doubt from the rest; has_gravity is false for a sensor
 // that only knows its angle, angle_deg NAN for one that does not.
 void tilt_judge(struct tilt_sample *sample, bool has_gravity);

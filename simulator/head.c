@@ -57,8 +57,10 @@ bool head_fourth_marker(const struct scenario_head *head, struct vec3 eye, struc
 struct rigid camera_pose(const struct scenario_camera *camera)
 {
     double pitch = camera->pitch_deg * M_PI / 180, yaw = camera->yaw_deg * M_PI / 180;
+    double roll = camera->roll_deg * M_PI / 180;
     struct rigid booth_from_camera = {
-        .rotation = mat3_mul(mat3_rotation(1, yaw), mat3_rotation(0, -pitch)),
+        .rotation = mat3_mul(mat3_mul(mat3_rotation(1, yaw), mat3_rotation(0, -pitch)),
+                             mat3_rotation(2, roll)),
         .translation = {camera->place_m[0], camera->place_m[1], camera->place_m[2]},
     };
     return rigid_inverse(booth_from_camera);

@@ -105,6 +105,14 @@ static const struct setting camera_rows[] = {
     VECTOR(place_m, 3, -5, 5, "m", "0 0.35 -0.20", "Place of the lens, booth frame."),
     DOUBLE(pitch_deg, -90, 90, "deg", "10", "How far the optical axis points above +z."),
     DOUBLE(yaw_deg, -90, 90, "deg", "0", "How far the optical axis turns towards +x."),
+    DOUBLE(roll_deg, -90, 90, "deg", "0", "How far the camera's right is turned up."),
+    {0},
+};
+#undef OWNER
+#define OWNER scenario_tools
+static const struct setting tools_rows[] = {
+    DOUBLE(protractor_deg, 0, 10, "deg", "0.05", "Standard deviation of a protractor's reading."),
+    DOUBLE(tape_m, 0, 0.1, "m", "0.0005", "Standard deviation of a tape's, in x, y and z."),
     {0},
 };
 #undef OWNER
@@ -224,6 +232,8 @@ static const struct setting inclinometer_rows[] = {
      "Which inclinometer it is: angles of 16 bits, or of 32."},
     BOOL(tcp, "no", "Modbus TCP at 127.0.0.1 instead of RTU on a line."),
     INT(port, 0, 65535, "", "0", "Its TCP port; 0 = any, told in the file inclinometer.port."),
+    VECTOR(turned_deg, 3, -80, 80, "deg", "0 0 0",
+           "How it is turned on the screen: about its right, then the sensor's own up and out."),
     TEXT(serial, "EMUWT901", "Serial number."),
     {0},
 };
@@ -255,7 +265,7 @@ static const struct setting lamp_rows[] = {
 };
 #undef OWNER
 
-enum { SECTIONS = 14, SECTIONS_ALL = SECTIONS + SCENARIO_LAMPS_MOST + 1 };
+enum { SECTIONS = 15, SECTIONS_ALL = SECTIONS + SCENARIO_LAMPS_MOST + 1 };
 
 static const char *const lamp_sections[SCENARIO_LAMPS_MOST] = {"lamp1", "lamp2", "lamp3",
                                                                "lamp4", "lamp5", "lamp6"};
@@ -271,6 +281,7 @@ static void sections_of(struct scenario *s, struct settings_section out[SECTIONS
         {"camera", camera_rows, &s->camera},
         {"opentrack", opentrack_rows, &s->opentrack},
         {"ceiling_camera", ceiling_camera_rows, &s->ceiling_camera},
+        {"tools", tools_rows, &s->tools},
         {"panel", panel_rows, &s->panel},
         {"spectrometer", spectrometer_rows, &s->spectrometer},
         {"spectrometer2", spectrometer_2_rows, &s->spectrometer_2},

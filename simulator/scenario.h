@@ -54,7 +54,12 @@ struct scenario_head {
 };
 
 struct scenario_camera {
-    double place_m[3], pitch_deg, yaw_deg;
+    double place_m[3], pitch_deg, yaw_deg, roll_deg;
+};
+
+// Standard deviations of what a person measures by hand.
+struct scenario_tools {
+    double protractor_deg, tape_m;
 };
 
 // opentrack, which sends where the head is in datagrams.
@@ -102,9 +107,10 @@ struct scenario_spectrometer_2 {
 };
 
 struct scenario_inclinometer {
-    int model;     // enum witmotion_map
+    int model; // enum witmotion_map
     bool tcp;
-    int port;      // 0 = any that is free
+    int port;             // 0 = any that is free
+    double turned_deg[3]; // on the screen: about its right, then about the sensor's own up and out
     char serial[SCENARIO_NAME_SIZE];
 };
 
@@ -147,6 +153,7 @@ struct scenario {
     struct scenario_camera camera;
     struct scenario_opentrack opentrack;
     struct scenario_ceiling_camera ceiling_camera;
+    struct scenario_tools tools;
     struct scenario_panel panel;
     struct scenario_spectrometer spectrometer;
     struct scenario_radiometer radiometer;

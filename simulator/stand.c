@@ -26,8 +26,20 @@ struct vec3 easel_point(const struct easel *easel, const struct scenario_screen 
     return vec3_add(easel->centre, vec3_add(vec3_scale(easel->right, x), vec3_scale(easel->up, y)));
 }
 
-struct vec3 easel_gravity(const struct easel *easel)
+// Two of three axes turned towards each other.
+static void turn(struct vec3 *a, struct vec3 *b, double deg)
 {
-    return vec3_scale((struct vec3){easel->right.y, easel->up.y, easel->normal.y},
-                      standard_gravity);
+    double c = cos(deg * M_PI / 180), s = sin(deg * M_PI / 180);
+    struct vec3 was = *a;
+    *a = vec3_add(vec3_scale(was, c), vec3_scale(*b, s));
+    *b = vec3_sub(vec3_scale(*b, c), vec3_scale(was, s));
+}
+
+struct vec3 easel_gravity(const struct easel *easel, const double turned_deg[3])
+{
+    struct vec3 x = easel->right, y = easel->up, z = easel->normal;
+    turn(&y, &z, turned_deg[0]);
+    turn(&z, &x, turned_deg[1]);
+    turn(&x, &y, turned_deg[2]);
+    return vec3_scale((struct vec3){x.y, y.y, z.y}, standard_gravity);
 }

@@ -18,7 +18,9 @@ struct easel easel_at(const struct scenario_stand *stand, double tilt_deg);
 struct vec3 easel_point(const struct easel *easel, const struct scenario_screen *screen,
                         double x_px, double y_px);
 
-// What an accelerometer on the screen reads at rest, screen axes, m/s2.
-struct vec3 easel_gravity(const struct easel *easel);
+// What an accelerometer on the screen reads at rest, m/s2, in its own axes: the
+// screen's, turned by three angles, each about an axis as the turns before left it: x,
+// y, z.
+struct vec3 easel_gravity(const struct easel *easel, const double turned_deg[3]);
 
 #endif

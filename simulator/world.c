@@ -54,7 +54,7 @@ static struct rigid tracker_pose(const struct scenario_opentrack *o)
 {
     struct scenario_camera camera = {{o->place_m[0], o->place_m[1], o->place_m[2]},
                                      o->pitch_deg,
-                                     o->yaw_deg};
+                                     o->yaw_deg, 0};
     return camera_pose(&camera);
 }
 
@@ -284,7 +284,7 @@ static struct vec3 sense_gravity(void *context, int64_t at_ns)
     struct world *w = context;
     struct world_state s = state_at(w, world_seconds(w, at_ns));
     struct easel easel = easel_at(&w->scenario.stand, s.tilt_deg);
-    return easel_gravity(&easel);
+    return easel_gravity(&easel, w->scenario.inclinometer.turned_deg);
 }
 
 static void sense_markers(void *context, int64_t at_ns, struct vec3 out[3])

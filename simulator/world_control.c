@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "simulator/tools.h"
+
 static bool get_number(json_t *request, const char *key, const double *preset, double *out,
                        struct error *err)
 {
@@ -92,7 +94,8 @@ static bool read_event(const struct scenario *s, const char *what, json_t *reque
         return get_number(request, "deg", NULL, &deg, err) && event_tilt(deg, over, out, err);
     if (!strcmp(what, CONTROL_HEAD))
         return get_place(request, "eye_m", &eye, err) && event_head(eye, over, out, err);
-    return fail(err, ERROR_CONFIG, "\"%s\" is not one of: lamp, tilt, head, aim, truth, fault",
+    return fail(err, ERROR_CONFIG,
+                "\"%s\" is not one of: lamp, tilt, head, aim, truth, fault, protractor, tape",
                 what);
 }
 
@@ -275,10 +278,30 @@ static json_t *answer_truth(struct world *world, int64_t now_ns, json_t *request
     return answer;
 }
 
+// What is measured by hand; NULL, err untouched, for anything else.
+static json_t *answer_tools(struct world *world, int64_t now_ns, const char *what, json_t *request,
+                            struct error *err)
+{
+    double x, y;
+    if (!strcmp(what, CONTROL_PROTRACTOR))
+        return json_pack("{s: f}", "deg", tools_protractor(world, now_ns));
+    if (strcmp(what, CONTROL_TAPE) || !get_number(request, "x_m", NULL, &x, err) ||
+        !get_number(request, "y_m", NULL, &y, err))
+        return NULL;
+    return json_pack("{s: o}", "point_m", json_of_vec3(tools_tape(world, now_ns, x, y)));
+}
+
+static bool is_tool(const char *what)
+{
+    return !strcmp(what, CONTROL_PROTRACTOR) || !strcmp(what, CONTROL_TAPE);
+}
+
 json_t *world_answer(struct world *world, int64_t now_ns, const char *what, json_t *request,
                      struct error *err)
 {
     struct event event;
+    if (is_tool(what))
+        return answer_tools(world, now_ns, what, request, err);
     if (strcmp(what, CONTROL_TRUTH) &&
         (!read_event(world_scenario(world), what, request, &event, err) ||
          !world_add_now(world, now_ns, event, err)))

@@ -8,6 +8,8 @@
 //   aim    target "screen", x_px, y_px, [from_m [x, y, z]]
 //          target "ceiling", x_m, z_m
 //   fault  instrument, kind
+//   protractor  nothing; the reply is deg alone
+//   tape   x_m, y_m on the screen from its centre; the reply is point_m [x, y, z]
 //   truth  nothing: what is so now (see below)
 //          reflectance 0..2, or {"nm": [...], "values": [...]}; [name]
 //          samples [{name, reflectance}, ...]

@@ -385,6 +385,19 @@ static void a_clock_that_goes_back_starts_ages_at_zero_and_blocks_nothing(void *
     assert_true(isfinite(s.lamp.level) && isfinite(s.tilt.deg));
 }
 
+static void how_the_sensor_is_turned_counts_at_once_with_new_settings(void **state)
+{
+    struct world *w = *state;
+    assert_near(read_tilt(w, 34, true).tilt.deg, 34, EXACT);
+    w->settings.accelerometer.turned_deg[0] = 4;
+    estimator_change(&w->e, &w->settings, &w->taught);
+    assert_near(read_tilt(w, 34, true).tilt.deg, 30, EXACT);
+    w->settings.accelerometer.turned_deg[1] = 60;
+    estimator_change(&w->e, &w->settings, &w->taught);
+    double upright_45 = atan(2) * 180 / acos(-1); // tan r = tan t / cos 60
+    assert_near(read_tilt(w, upright_45, true).tilt.deg, 45 - 4, EXACT);
+}
+
 static void a_sample_older_than_the_last_one_is_passed_over(void **state)
 {
     struct world *w = *state;
@@ -489,6 +502,7 @@ int main(void)
         IN_A_WORLD(a_resting_eye_is_steadier_than_its_samples),
         IN_A_WORLD(a_moving_eye_is_followed_within_a_few_centimetres_and_then_reached),
         IN_A_WORLD(a_clock_that_goes_back_starts_ages_at_zero_and_blocks_nothing),
+        IN_A_WORLD(how_the_sensor_is_turned_counts_at_once_with_new_settings),
         IN_A_WORLD(a_sample_older_than_the_last_one_is_passed_over),
         IN_A_WORLD(equal_times_divide_by_nothing),
         IN_A_WORLD(a_sample_from_the_future_has_no_age),

@@ -67,11 +67,21 @@ static void a_fourth_marker_is_there_when_worn_and_turns_with_the_head(void **st
     assert_true(fabs(apart.x - 0.06) > 1e-4);
 }
 
+static void a_rolled_camera_has_its_right_up(void **state)
+{
+    (void)state;
+    struct scenario_camera camera = {.place_m = {0, 0.3, -0.2}, .roll_deg = 90};
+    expect_at(rigid_apply(camera_pose(&camera), (struct vec3){0, 1.3, -0.2}), 1, 0, 0);
+    camera = (struct scenario_camera){.pitch_deg = 30, .roll_deg = 90};
+    expect_at(rigid_apply(camera_pose(&camera), (struct vec3){0, 0.5, sqrt(0.75)}), 0, 0, 1);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_clip_has_its_markers_in_one_upright_plane),
         cmocka_unit_test(a_cap_has_one_on_top_and_two_below_it_at_the_sides),
+        cmocka_unit_test(a_rolled_camera_has_its_right_up),
         cmocka_unit_test(a_fourth_marker_is_there_when_worn_and_turns_with_the_head),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

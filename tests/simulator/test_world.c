@@ -3,6 +3,7 @@
 
 #include "base/clock.h"
 #include "simulator/stand.h"
+#include "simulator/tools.h"
 #include "simulator/wire.h"
 #include "simulator/world_control.h"
 #include "tests/simulator/cmocka_here.h"
@@ -219,6 +220,49 @@ static void gravity_follows_the_tilt(void **state)
         assert_near(g.y, 9.81 * sin(a), CAST);
         assert_near(g.z, 9.81 * cos(a), CAST);
     }
+}
+
+static void a_turned_sensor_feels_gravity_along_its_own_axes(void **state)
+{
+    (void)state;
+    const struct scenario_stand *stand = &world_scenario(world)->stand;
+    struct easel flat = easel_at(stand, 0), upright = easel_at(stand, 90);
+    struct vec3 g = easel_gravity(&flat, (double[]){20, 0, 0}); // as if tilted by 20
+    assert_near(g.y, 9.81 * sin(20 * M_PI / 180), CAST);
+    assert_near(g.z, 9.81 * cos(20 * M_PI / 180), CAST);
+    g = easel_gravity(&flat, (double[]){0, 30, 0}); // its right points down
+    assert_near(g.x, -9.81 / 2, CAST);
+    assert_near(g.y, 0, CAST);
+    g = easel_gravity(&upright, (double[]){0, 0, 30}); // its right points up
+    assert_near(g.x, 9.81 / 2, CAST);
+    assert_near(g.z, 0, CAST);
+    g = easel_gravity(&upright, (double[]){15, -25, 40});
+    assert_near(vec3_length(g), 9.81, CAST);
+}
+
+static void the_technicians_tools_are_near_the_truth_and_no_two_readings_are_alike(void **state)
+{
+    (void)state;
+    enum { READINGS = 400 };
+    const struct scenario *s = world_scenario(world);
+    struct easel easel = easel_at(&s->stand, 60);
+    struct vec3 corner = easel_point(&easel, &s->screen, -0.5, -0.5), off = {0};
+    double deg = 0, squares[2] = {0};
+    tell(1, CONTROL_TILT, "{\"deg\": 60}");
+    for (int i = 0; i < READINGS; i++) {
+        struct vec3 p =
+            tools_tape(world, at(2 + i), -s->screen.width_m / 2, s->screen.height_m / 2);
+        double d = tools_protractor(world, at(2 + i)) - 60;
+        p = vec3_sub(p, corner);
+        off = vec3_add(off, vec3_scale(p, 1.0 / READINGS));
+        deg += d / READINGS;
+        squares[0] += d * d / READINGS;
+        squares[1] += vec3_dot(p, p) / 3 / READINGS;
+    }
+    assert_true(fabs(deg) < 4 * s->tools.protractor_deg / sqrt(READINGS));
+    assert_true(vec3_length(off) < 6 * s->tools.tape_m / sqrt(READINGS));
+    assert_near(sqrt(squares[0]) / s->tools.protractor_deg, 1, 0.15); // 4 / sqrt(2 x 400)
+    assert_near(sqrt(squares[1]) / s->tools.tape_m, 1, 0.15);
 }
 
 static void the_screen_turns_about_its_hinge(void **state)
@@ -559,6 +603,8 @@ int main(void)
         WORLD_TEST(an_exposure_that_sees_the_lamp_switched_sees_both),
         WORLD_TEST(tilting_changes_the_screens_light_but_not_the_collectors),
         WORLD_TEST(gravity_follows_the_tilt),
+        WORLD_TEST(a_turned_sensor_feels_gravity_along_its_own_axes),
+        WORLD_TEST(the_technicians_tools_are_near_the_truth_and_no_two_readings_are_alike),
         WORLD_TEST(the_screen_turns_about_its_hinge),
         WORLD_TEST(a_slow_tilt_passes_through_the_middle),
         WORLD_TEST(a_new_movement_begins_where_the_last_one_was),
