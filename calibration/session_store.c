@@ -21,6 +21,8 @@ bool session_store_begin(struct session *s, struct error *err)
     store_abandon(&trial);
     if (!(b->given & 1u << STORED_LAMPS))
         snprintf(b->lamps.folder, sizeof b->lamps.folder, "%s/" STORE_LAMPS, s->out);
+    if (!(b->given & 1u << STORED_VIEW))
+        snprintf(b->display.view, sizeof b->display.view, "%s/" STORE_VIEW, s->out);
     if (!(b->given & 1u << STORED_MODEL))
         snprintf(b->display.model, sizeof b->display.model, "%s/" STORE_DISPLAY, s->out);
     return true;
@@ -75,6 +77,8 @@ static bool put_all(struct session *s, enum session_stage stage, struct store_dr
     if (stage >= STAGE_CHARACTERISED && (!store_put(d, b->display.model, STORE_DISPLAY, err) ||
                                          !put_beside(d, s->out, STORE_MEASUREMENTS, err) ||
                                          !put_beside(d, s->out, STORE_VERIFICATION, err)))
+        return false;
+    if (s->facts->view.measured && !store_put(d, b->display.view, STORE_VIEW, err))
         return false;
     return stage < STAGE_REPORTED || put_report(d, s->out, err);
 }

@@ -41,7 +41,7 @@ bool session_view(struct session *s, struct error *err)
     if (!measure(s, &m, err))
         return while_doing(err, "the display from other directions");
     take_facts(&m, &s->facts->view);
-    return bench_reload(&s->bench, err);
+    return session_store(s, STAGE_CHARACTERISED, err) && bench_reload(&s->bench, err);
 }
 
 struct vec3 session_eye(const struct session *s)

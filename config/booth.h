@@ -28,6 +28,7 @@ enum expired_rule { EXPIRED_REFUSE, EXPIRED_WARN };
 // The settings that the store of calibrations provides where nobody gives them.
 #define BOOTH_STORED(X)                                                                            \
     X(MODEL, "display", "model")                                                                   \
+    X(VIEW, "display", "view")                                                                     \
     X(LAMPS, "lamps", "folder")                                                                    \
     X(HINGE, "stand", "hinge_m") /* from here on of geometry.ini */                                \
     X(CENTRE, "stand", "centre_from_hinge_m")                                                      \

@@ -148,6 +148,8 @@ static bool preset_lamps(const char *path, struct booth_settings *b, struct erro
 {
     if (!*b->display.model)
         b->given &= ~(1u << STORED_MODEL);
+    if (!*b->display.view)
+        b->given &= ~(1u << STORED_VIEW);
     if (*b->lamps.folder)
         return true;
     b->given &= ~(1u << STORED_LAMPS);

@@ -81,6 +81,7 @@ static bool take_version(struct booth_settings *booth, const struct store_versio
     strcpy(c->folder, v->folder);
     if (!take_path(&b, STORED_MODEL, b.display.model, sizeof b.display.model, STORE_DISPLAY, c,
                    err) ||
+        !take_path(&b, STORED_VIEW, b.display.view, sizeof b.display.view, STORE_VIEW, c, err) ||
         !take_path(&b, STORED_LAMPS, b.lamps.folder, sizeof b.lamps.folder, STORE_LAMPS, c, err) ||
         !take_geometry(&b, c, err) || !is_placed(&b, err))
         return false;

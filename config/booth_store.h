@@ -24,7 +24,7 @@ struct booth_calibration {
 bool booth_store_place(const struct booth_settings *booth, struct store_place *out,
                        struct error *err);
 
-// Takes display model, lamp folder, stand and tracker from the version in force
+// Takes display model and view, lamp folder, stand and tracker from the version in force
 // where the settings name a store; a setting that file or override gives counts
 // instead. Verifies all of the version. Without a store, or before its first
 // version, nothing happens. False when the version in force cannot be used: it

@@ -22,6 +22,7 @@
 enum { STORE_PATH = 1024, STORE_FILES_MOST = 10000 };
 
 #define STORE_DISPLAY "display.ini"      // of a version: the display model
+#define STORE_VIEW "view.ini"            // its dependence on direction and place
 #define STORE_LAMPS "lamps"              // the lamp folder
 #define STORE_GEOMETRY "geometry.ini"    // stand and tracker
 #define STORE_MEASUREMENTS "display.ti3" // what the model was fitted to
