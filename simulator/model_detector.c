@@ -31,8 +31,8 @@ struct pixel {
 
 struct detector {
     struct detector_options options;
-    enum detector_kind_of_pixel kinds[DETECTOR_PIXELS_MOST];
-    struct pixel pixels[DETECTOR_PIXELS_MOST];
+    enum detector_kind_of_pixel kinds[MODEL_PIXELS_MOST];
+    struct pixel pixels[MODEL_PIXELS_MOST];
     int count;
     double unit; // counts per count of the axis to FULL_SCALE
     double measured_of_light[INVERSE_STEPS + 2];
@@ -191,7 +191,7 @@ static double exposed(const struct detector *d, const struct pixel *pixel, doubl
 void detector_expose(const struct detector *d, const struct spectrum *irradiance,
                      double exposure_s, double age_s, struct noise *noise, uint16_t *raw)
 {
-    double light[DETECTOR_PIXELS_MOST] = {0}, mean = 0;
+    double light[MODEL_PIXELS_MOST] = {0}, mean = 0;
     for (int p = 0; p < d->count; p++) {
         if (d->pixels[p].lit > 0)
             light[p] = exposure_s * light_of(&d->pixels[p], irradiance);

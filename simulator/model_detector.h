@@ -9,7 +9,7 @@
 #include "colorimetry/spectrum.h"
 #include "simulator/model_noise.h"
 
-enum { DETECTOR_PIXELS_MOST = 3840, DETECTOR_ZONES_MOST = 7 };
+enum { MODEL_PIXELS_MOST = 3840, DETECTOR_ZONES_MOST = 7 };
 
 enum detector_kind_of_pixel {
     DETECTOR_BLACK = 1,  // covered

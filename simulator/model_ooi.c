@@ -34,7 +34,7 @@ enum {
     SLOT_SIZE = 15,
     SYNC = 0x69,
     WRONG_SYNC = 0x96,
-    SPECTRUM_MOST = 2 * DETECTOR_PIXELS_MOST + 1,
+    SPECTRUM_MOST = 2 * MODEL_PIXELS_MOST + 1,
     ROOM_TENTHS = 240, // degrees
     REPLIES = 4,
     REPLY_MOST = 64,
@@ -243,7 +243,7 @@ static void load_spectrum(struct ooi *d)
     struct spectrum light;
     d->options.around.irradiance(d->options.around.context, d->light_from_ns, d->light_to_ns,
                                  &light);
-    uint16_t raw[DETECTOR_PIXELS_MOST];
+    uint16_t raw[MODEL_PIXELS_MOST];
     detector_expose(d->detector, &light, (double)(d->light_to_ns - d->light_from_ns) * 1e-9,
                     (double)(d->light_to_ns - d->options.powered_ns) * 1e-9, &d->noise, raw);
     int pixels = d->upset == OOI_OTHER_PIXELS ? d->kind->pixels / 2 : d->kind->pixels;

@@ -202,7 +202,7 @@ static void teach(struct session_here *s, uint64_t seed)
     noise_init(&noise, seed, 't');
     for (int i = 0; i < TEACH; i++) {
         static _Thread_local struct ocean_reading reading;
-        static _Thread_local uint16_t raw[DETECTOR_PIXELS_MOST];
+        static _Thread_local uint16_t raw[MODEL_PIXELS_MOST];
         reading = (struct ocean_reading){.integration_us = EXPOSURE_US};
         detector_expose(shared.detectors[seed % LAMPS], &seen, EXPOSURE_US * 1e-6, 3600, &noise,
                         raw);
