@@ -11,6 +11,7 @@
 #include "colorimetry/metric.h"
 
 static const double LENGTH = 160;         // CIELAB units over which the residual stays alike
+static const double MARGIN = 10;          // CIELAB units of the box around the gamut
 static const double PENALTY_LEAST = 1e-6; // and up by the half decade
 static const double HUBER = 1.5;          // times the median difference: counts by less beyond
 enum { PENALTIES = 19, ROUNDS = 2, SIDE = 9 };
@@ -64,7 +65,8 @@ static struct lab lab_in(const struct fit *f, struct xyz c)
     return lab;
 }
 
-// The box is that of the plain model's gamut.
+// The box is that of the plain model's gamut and a margin, so that the residual
+// stays smooth at the gamut's surface.
 static void find_box(struct fit *f)
 {
     struct vec3 *least = &f->box.least, *most = &f->box.most;
@@ -77,6 +79,9 @@ static void find_box(struct fit *f)
         *least = (struct vec3){fmin(least->x, lab.L), fmin(least->y, lab.a), fmin(least->z, lab.b)};
         *most = (struct vec3){fmax(most->x, lab.L), fmax(most->y, lab.a), fmax(most->z, lab.b)};
     }
+    const struct vec3 margin = {MARGIN, MARGIN, MARGIN};
+    *least = vec3_sub(*least, margin);
+    *most = vec3_add(*most, margin);
 }
 
 static double matern(double distance)

@@ -6,7 +6,6 @@
 static const double CONDITION_MOST = 50;
 static const double SLOPE_LEAST = 1e-6;
 static const double BELOW_ZERO_MOST = 0.05; // part of a primary's Y: noise of the fit
-static const double SHARE_FLOOR = 1e-3;     // linear light: where two channels stop sharing
 static const double SETTLED = 1e-13;        // of an inversion, per unit of what is inverted
 enum { STEPS_MOST = 300 }; // DISPLAY_FOLD_MOST ^ 300 < SETTLED, should Newton never help
 
@@ -64,36 +63,23 @@ static bool primaries_check(const struct display_model *model, struct error *err
     return true;
 }
 
-// What two channels share: from 0 to the lesser, and its slopes.
-static double share(double x, double y, double *by_x, double *by_y)
-{
-    double sum = x + y + SHARE_FLOOR;
-    *by_x = 2 * y * (y + SHARE_FLOOR) / (sum * sum);
-    *by_y = 2 * x * (x + SHARE_FLOOR) / (sum * sum);
-    return 2 * x * y / sum;
-}
-
 void display_terms(struct counts linear, double terms[DISPLAY_TERMS],
                    double slopes[DISPLAY_TERMS][3])
 {
+    const double raw[3] = {linear.r, linear.g, linear.b};
     const double l[3] = {display_clamped(linear.r), display_clamped(linear.g),
                          display_clamped(linear.b)};
-    const double raw[3] = {linear.r, linear.g, linear.b};
     for (int c = 0; c < 3; c++) {
-        int next = (c + 1) % 3;
-        double by_c, by_next;
-        terms[c] = share(l[c], l[next], &by_c, &by_next);
-        terms[3 + c] = l[c] * (1 - l[c]);
+        int next = (c + 1) % 3, other = 3 - c - next;
+        terms[c] = display_share(l[c], l[next]);
+        terms[3 + c] = display_bend(l[c]);
         if (!slopes)
             continue;
-        slopes[c][c] = by_c;
-        slopes[c][next] = by_next;
-        slopes[c][3 - c - next] = slopes[3 + c][next] = slopes[3 + c][3 - c - next] = 0;
-        slopes[3 + c][c] = 1 - 2 * l[c];
+        slopes[c][c] = display_inside(raw[c], display_share_slope(l[c], l[next]));
+        slopes[c][next] = display_inside(raw[next], display_share_slope(l[next], l[c]));
+        slopes[3 + c][c] = display_inside(raw[c], 1 - 2 * l[c]);
+        slopes[c][other] = slopes[3 + c][next] = slopes[3 + c][other] = 0;
     }
-    for (int c = 0; slopes && c < 3; c++)
-        for (int t = 0; t < DISPLAY_TERMS && l[c] != raw[c]; t++)
-            slopes[t][c] = 0;
 }
 
 // The slopes of a shared term sum to at most 2, those of r (1 - r) to 1.

@@ -45,34 +45,44 @@ struct lattice_place lattice_find(const struct lattice *l, struct vec3 at)
     return place;
 }
 
-// Sum over the 64 coefficients with one weight table an axis.
-static struct vec3 sum(const struct lattice *l, const int first[3], const double *x,
-                       const double *y, const double *z)
+// A value and its slopes by x, y, z, each for all three.
+struct sums {
+    double value[3], by_x[3], by_y[3], by_z[3];
+};
+
+// Adds what a line of four coefficients along z makes.
+static void add_line(const double (*line)[3], const struct lattice_place *p, int i, int j,
+                     struct sums *s)
 {
-    double v[3] = {0, 0, 0};
-    for (int i = 0; i < 4; i++)
-        for (int j = 0; j < 4; j++) {
-            double xy = x[i] * y[j];
-            const double(*line)[3] = l->node + lattice_node(first[0] + i, first[1] + j, first[2]);
-            for (int k = 0; k < 4; k++)
-                for (int n = 0; n < 3; n++)
-                    v[n] += xy * z[k] * line[k][n];
+    const double xy = p->weight[0][i] * p->weight[1][j], dx = p->slope[0][i] * p->weight[1][j],
+                 dy = p->weight[0][i] * p->slope[1][j];
+    for (int n = 0; n < 3; n++) {
+        double along = 0, across = 0;
+        for (int k = 0; k < 4; k++) {
+            along += p->weight[2][k] * line[k][n];
+            across += p->slope[2][k] * line[k][n];
         }
-    return (struct vec3){v[0], v[1], v[2]};
+        s->value[n] += xy * along;
+        s->by_x[n] += dx * along;
+        s->by_y[n] += dy * along;
+        s->by_z[n] += xy * across;
+    }
 }
 
 struct vec3 lattice_at(const struct lattice *l, struct vec3 at, struct mat3 *slopes)
 {
     struct lattice_place p = lattice_find(l, at);
-    for (int axis = 0; slopes && axis < 3; axis++) {
-        const double *w[3] = {p.weight[0], p.weight[1], p.weight[2]};
-        w[axis] = p.slope[axis];
-        struct vec3 s = sum(l, p.first, w[0], w[1], w[2]);
-        slopes->m[0][axis] = s.x;
-        slopes->m[1][axis] = s.y;
-        slopes->m[2][axis] = s.z;
+    struct sums s = {.value = {0}};
+    for (int i = 0; i < 4; i++)
+        for (int j = 0; j < 4; j++)
+            add_line(l->node + lattice_node(p.first[0] + i, p.first[1] + j, p.first[2]), &p, i, j,
+                     &s);
+    for (int n = 0; slopes && n < 3; n++) {
+        slopes->m[n][0] = s.by_x[n];
+        slopes->m[n][1] = s.by_y[n];
+        slopes->m[n][2] = s.by_z[n];
     }
-    return sum(l, p.first, p.weight[0], p.weight[1], p.weight[2]);
+    return (struct vec3){s.value[0], s.value[1], s.value[2]};
 }
 
 double lattice_slope_most(const struct lattice *l)

@@ -38,7 +38,7 @@ struct lattice_place lattice_find(const struct lattice *lattice, struct vec3 at)
 struct vec3 lattice_at(const struct lattice *lattice, struct vec3 at, struct mat3 *slopes);
 
 // The largest sum of the absolute slopes of any value, of 13 places a side:
-// four an interval, between which cubic splines hardly bend. Infinite when a
+// four an interval, between which it may be exceeded by some 5 %. Infinite when a
 // coefficient is not finite.
 double lattice_slope_most(const struct lattice *lattice);
 

@@ -5,17 +5,31 @@
 #include <string.h>
 
 #include "render/context.h"
+#include "render/display_gl.h"
 #include "render/dither.h"
 #include "render/program.h"
 #include "render/renderer.h"
+#include "render/view_gl.h"
 
 // A texture's number is also its unit.
-enum texture { LIGHTS, ILLUMINANCE, TEXELS, PLACES, CURVES, RANKS, VIEW, EMITTED, COUNTS, TEXTURE_COUNT };
+enum place {
+    LIGHTS,
+    ILLUMINANCE,
+    TEXELS,
+    PLACES,
+    CURVES,
+    TABLE,
+    RANKS,
+    VIEW,
+    EMITTED,
+    COUNTS,
+    TEXTURE_COUNT
+};
 
 static const char *const SAMPLERS[] = {
     [LIGHTS] = "lights", [ILLUMINANCE] = "illuminance", [TEXELS] = "texels",
-    [PLACES] = "places", [CURVES] = "curves",           [RANKS] = "ranks",
-    [VIEW] = "view_places",
+    [PLACES] = "places", [CURVES] = "curves",           [TABLE] = "table",
+    [RANKS] = "ranks",   [VIEW] = "view_places",
 };
 
 enum { LIGHTS_A_ROW = 64 };
@@ -38,16 +52,11 @@ struct renderer {
 
 // ---- set-up ----------------------------------------------------------------
 
-static void upload(struct renderer *r, enum texture which, GLint inner, int width, int height,
+static void upload(struct renderer *r, enum place which, GLint inner, int width, int height,
                    GLenum format, GLenum type, const void *data)
 {
-    glActiveTexture(GL_TEXTURE0 + which);
-    glBindTexture(GL_TEXTURE_2D, r->textures[which]);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAX_LEVEL, 0);
-    glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-    glTexImage2D(GL_TEXTURE_2D, 0, inner, width, height, 0, format, type, data);
+    texture_upload((struct texture){r->textures[which], which}, inner, width, height, format, type,
+                   data);
 }
 
 static void upload_ranks(struct renderer *r)
@@ -307,51 +316,15 @@ static bool texel_stage(struct renderer *r, const struct scene *scene, struct er
     return true;
 }
 
-static void upload_view(struct renderer *r, const struct display_view *view)
-{
-    float nodes[VIEW_DENSE * VIEW_DENSE][VIEW_CHANNELS];
-    float angles[VIEW_CHANNELS * VIEW_TERMS];
-    for (int i = 0; i < VIEW_DENSE * VIEW_DENSE; i++)
-        for (int c = 0; c < VIEW_CHANNELS; c++)
-            nodes[i][c] = (float)view->dense[c][i / VIEW_DENSE][i % VIEW_DENSE];
-    for (int i = 0; i < VIEW_CHANNELS * VIEW_TERMS; i++)
-        angles[i] = (float)view->angle[i / VIEW_TERMS][i % VIEW_TERMS];
-    upload(r, VIEW, GL_RGBA32F, VIEW_DENSE, VIEW_DENSE, GL_RGBA, GL_FLOAT, nodes);
-    glUseProgram(r->frame_program);
-    glUniform1fv(at(r->frame_program, "view_angles"), VIEW_CHANNELS * VIEW_TERMS, angles);
-    glUniform1f(at(r->frame_program, "view_sine_most"), (float)view->sine_most);
-}
-
-static void display_stage(struct renderer *r, const struct scene *scene)
+static bool display_stage(struct renderer *r, const struct scene *scene, struct error *err)
 {
     if (r->seen_display && same_display(&r->seen, scene))
-        return;
-    const struct display_model *model = scene->display;
-    float curves[3][DISPLAY_NODES], rows[3][3];
-    struct xyz black = display_black(model);
-    for (int c = 0; c < 3; c++) {
-        for (int k = 0; k < DISPLAY_NODES; k++)
-            curves[c][k] = (float)model->curve[c][k];
-        for (int k = 0; k < 3; k++)
-            rows[c][k] = (float)model->inverse[c][k];
-    }
-    upload(r, CURVES, GL_R32F, DISPLAY_NODES, 3, GL_RED, GL_FLOAT, curves);
-    glUseProgram(r->frame_program);
-    glUniform3fv(at(r->frame_program, "from_xyz"), 3, rows[0]);
+        return true;
     if (scene->view)
-        upload_view(r, scene->view);
-    glUniform3f(at(r->frame_program, "black"), (float)black.X, (float)black.Y, (float)black.Z);
-}
-
-static void view_uniforms(GLuint program, const struct scene *scene)
-{
-    const struct screen *s = &scene->screen;
-    struct vec3 eye = rigid_apply(rigid_inverse(scene->booth_from_screen), scene->eye);
-    glUniform1i(at(program, "viewed"), scene->view != NULL);
-    glUniform3f(at(program, "eye"), (float)eye.x, (float)eye.y, (float)eye.z);
-    glUniform2f(at(program, "pixel_m"), (float)(s->width_m / s->width_px),
-                (float)(s->height_m / s->height_px));
-    glUniform2f(at(program, "corner_m"), (float)(-s->width_m / 2), (float)(-s->height_m / 2));
+        view_gl_upload(r->frame_program, scene->view, (struct texture){r->textures[VIEW], VIEW});
+    return display_gl_upload(r->frame_program, scene->display,
+                             (struct texture){r->textures[CURVES], CURVES},
+                             (struct texture){r->textures[TABLE], TABLE}, err);
 }
 
 static void frame_stage(struct renderer *r, const struct scene *scene)
@@ -365,8 +338,7 @@ static void frame_stage(struct renderer *r, const struct scene *scene)
     glUniform1f(at(program, "code_most"), (float)((1 << r->code_bits) - 1));
     glUniform1i(at(program, "dithered"), scene->dither);
     glUniform1i(at(program, "height"), r->height);
-    view_uniforms(program, scene);
-    glUniform1f(at(program, "tolerance"), (float)DISPLAY_GAMUT_TOLERANCE);
+    view_gl_uniforms(program, scene);
     draw(program, r->frame_target, r->width, r->height);
     r->surface = true;
     r->outside = -1;
@@ -381,12 +353,11 @@ static bool draw_surface(struct renderer *r, const struct scene *scene, struct e
     if (!scene->texels || !scene->display)
         return fail(err, ERROR_CONFIG, "no %s to show a surface with",
                     scene->texels ? "display model" : "material");
-    bool good =
-        light_stage(r, scene, err) && place_stage(r, scene, err) && texel_stage(r, scene, err);
+    bool good = light_stage(r, scene, err) && place_stage(r, scene, err) &&
+                texel_stage(r, scene, err) && display_stage(r, scene, err);
     r->seen_lights = r->seen_places = r->seen_texels = r->seen_display = good;
     if (!good)
         return false;
-    display_stage(r, scene);
     r->seen = *scene;
     frame_stage(r, scene);
     return true;

@@ -22,7 +22,8 @@ static GLuint compile(GLenum kind, const char *name, struct error *err)
 {
     const char *parts[] = {
         text_of("head.glsl"),   text_of("display.glsl"), text_of("diffuse.glsl"),
-        text_of("output.glsl"), text_of("display_view.glsl"), text_of(name),
+        text_of("output.glsl"), text_of("display_view.glsl"), text_of("view.glsl"),
+        text_of("inverse.glsl"), text_of(name),
     };
     GLuint shader = glCreateShader(kind);
     GLint good = GL_FALSE;

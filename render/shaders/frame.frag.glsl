@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // From illuminance and material to XYZ that the screen must emit, and on to
-// its digital counts. Assembled after display.glsl, diffuse.glsl, output.glsl.
+// its digital counts. Assembled after display.glsl, diffuse.glsl, output.glsl,
+// inverse.glsl.
 
 uniform sampler2D illuminance; // lux at the taught level, per pixel
 uniform sampler2D texels;      // relative XYZ of the material
@@ -10,18 +11,9 @@ uniform isampler2D ranks;      // the dither tile
 uniform float level;
 uniform vec3 white;
 uniform float screen_reflectance;
-uniform vec3 black;      // of the display, cd/m2
-uniform vec3 from_xyz[3]; // rows: XYZ less black to linear light
-uniform bool viewed;       // whether direction and place count
-uniform vec3 eye;          // in the screen's frame, m
-uniform vec2 pixel_m;      // size of a pixel
-uniform vec2 corner_m;     // bottom left corner of the screen
-uniform float view_angles[28]; // red, green, blue, black: seven terms each
-uniform float view_sine_most;
 uniform float code_most; // 255 or 1023
 uniform bool dithered;
 uniform int height;
-uniform float tolerance; // of the gamut test, in linear light
 layout(location = 0) out vec4 emitted; // XYZ in cd/m2, 1 where out of gamut
 layout(location = 1) out vec4 counts;  // whole codes / code_most
 
@@ -46,22 +38,6 @@ float code_of(int channel, float linear, ivec2 pixel, ivec2 shift)
            code_most;
 }
 
-// Gains of red, green, blue and black towards the eye.
-vec4 gains_at(ivec2 from_below)
-{
-    vec3 to_eye = eye - vec3(corner_m + (vec2(from_below) + 0.5) * pixel_m, 0.0);
-    vec2 d = to_eye.xy / length(to_eye);
-    d *= view_held(d.x, d.y, view_sine_most);
-    vec2 place = (vec2(from_below) + 0.5) * pixel_m / (-2.0 * corner_m);
-    vec4 gains;
-    for (int c = 0; c < 4; c++)
-        gains[c] = view_angle(view_angles[7 * c], view_angles[7 * c + 1], view_angles[7 * c + 2],
-                              view_angles[7 * c + 3], view_angles[7 * c + 4],
-                              view_angles[7 * c + 5], view_angles[7 * c + 6], d.x, d.y) *
-                   view_place(c, place.x, 1.0 - place.y);
-    return gains;
-}
-
 void main()
 {
     ivec2 from_below = ivec2(gl_FragCoord.xy);
@@ -77,18 +53,9 @@ void main()
     vec3 relative = texelFetch(texels, ivec2(column, row), 0).rgb;
     vec3 target = vec3(emitted_of(relative.x, white.x, lux), emitted_of(relative.y, white.y, lux),
                        emitted_of(relative.z, white.z, lux));
-    vec4 gains = viewed ? gains_at(from_below) : vec4(1.0);
-    vec3 d = target - black * gains.a;
-    float r = display_inverse_row(from_xyz[0].x, from_xyz[0].y, from_xyz[0].z, d.x, d.y, d.z);
-    float g = display_inverse_row(from_xyz[1].x, from_xyz[1].y, from_xyz[1].z, d.x, d.y, d.z);
-    float b = display_inverse_row(from_xyz[2].x, from_xyz[2].y, from_xyz[2].z, d.x, d.y, d.z);
-    r /= gains.r;
-    g /= gains.g;
-    b /= gains.b;
-    bool outside = display_outside(r, tolerance) || display_outside(g, tolerance) ||
-                   display_outside(b, tolerance);
-    emitted = vec4(target, outside ? 1.0 : 0.0);
-    counts.r = code_of(0, r, pixel, ivec2(0, 0));
-    counts.g = code_of(1, g, pixel, ivec2(23, 41));
-    counts.b = code_of(2, b, pixel, ivec2(47, 17));
+    vec3 linear = inverse_linear(target, viewed ? view_gains(from_below) : vec4(1.0));
+    emitted = vec4(target, inverse_outside(linear) ? 1.0 : 0.0);
+    counts.r = code_of(0, linear.r, pixel, ivec2(0, 0));
+    counts.g = code_of(1, linear.g, pixel, ivec2(23, 41));
+    counts.b = code_of(2, linear.b, pixel, ivec2(47, 17));
 }

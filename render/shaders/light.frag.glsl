@@ -5,8 +5,6 @@
 uniform sampler2D lights; // 64 a row: place in m, candela
 uniform int light_count;
 uniform vec3 down;        // unit
-uniform vec2 pixel_m;     // size of a pixel
-uniform vec2 corner_m;    // bottom left corner of the screen
 out float illuminance;
 
 void main()
