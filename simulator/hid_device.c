@@ -233,7 +233,7 @@ static bool show(void *owner, struct error *err)
 {
     struct hid_device_emulated *d = owner;
     if (!add(d, describe_hid, err) || !add(d, describe_hidraw, err) ||
-        !node_link(&d->wire.node, d->wire.testbed, d->wire.devnode, err))
+        !node_link_device(&d->wire.node, d->wire.testbed, d->wire.devnode, err))
         return false;
     tell(d, d->hid_path, "add");
     tell(d, d->hidraw_path, "add");

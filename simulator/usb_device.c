@@ -371,7 +371,7 @@ static bool show(void *owner, struct error *err)
     GString *text = g_string_new(NULL);
     usb_place_describe(&d->place, &d->model, text);
     if (!wire_device_add(&d->wire, text, err) ||
-        !node_link(&d->wire.node, d->wire.testbed, d->wire.devnode, err))
+        !node_link_device(&d->wire.node, d->wire.testbed, d->wire.devnode, err))
         return false;
     d->shown = true;
     tell(d, "add");

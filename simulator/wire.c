@@ -342,6 +342,8 @@ void wire_set_fault(struct wire *wire, enum wire_instrument instrument, enum wir
     } else {
         if (1u << instrument & WIRE_ON_USB)
             pull_usb(spectrometer(w, instrument), fault);
+        if (fault == WIRE_FORBIDDEN) // nobody is to open it before
+            set_fault(w, instrument, fault);
         come_back(w, instrument);
     }
     set_fault(w, instrument, fault);

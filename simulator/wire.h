@@ -61,7 +61,7 @@ enum {
     X(PULLED_IN_SPECTRUM, "pulled-in-spectrum", WIRE_ON_USB) /* goes within the next spectrum */   \
     X(MOVED, "moved", WIRE_ON_USB) /* at once: pulled and plugged again at the other bus */        \
     X(BLANK, "blank", WIRE_ON_USB) /* comes back without its firmware, as 04B4:8613 */             \
-    X(FORBIDDEN, "forbidden", WIRE_ON_USB | WIRE_ON_HID)     /* opening it fails with EACCES */    \
+    X(FORBIDDEN, "forbidden", WIRE_ON_DEVICES)               /* opening it fails with EACCES */    \
     X(FLOOD, "flood", WIRE_ON_HID | WIRE_ON_UDP) /* fifty reports where there was one */           \
     X(WRONG_REPORT, "wrong-report", WIRE_ON_HID) /* reports of another kind */                     \
     X(BAD_CRC, "bad-crc", WIRE_ON_MODBUS)                                                          \

@@ -133,8 +133,7 @@ void wire_device_set_fault(struct wire_device *device, enum wire_fault fault)
 {
     waiter_lock(&device->waiter);
     device->fault = fault;
-    if (device->plugged)
-        node_forbid(&device->node, fault == WIRE_FORBIDDEN);
+    node_forbid(&device->node, fault == WIRE_FORBIDDEN);
     waiter_wake(&device->waiter);
     waiter_unlock(&device->waiter);
 }

@@ -87,16 +87,6 @@ struct line *line_create(const char *path, const struct line_end *end, struct er
     return NULL;
 }
 
-static bool link_to(struct line *line, struct error *err)
-{
-    char fresh[sizeof(line->path) + 4];
-    snprintf(fresh, sizeof(fresh), "%s.new", line->path);
-    unlink(fresh);
-    if (symlink(line->node.slave_path, fresh) != 0 || rename(fresh, line->path) != 0)
-        return fail_errno(err, "linking %s", line->path);
-    return true;
-}
-
 bool line_plug(struct line *line, struct error *err)
 {
     if (line->plugged)
@@ -108,7 +98,7 @@ bool line_plug(struct line *line, struct error *err)
     line->stopping = false;
     line->running = pthread_create(&line->thread, NULL, run, line) == 0;
     line->plugged = true;
-    if (line->running && link_to(line, err))
+    if (line->running && node_link(&line->node, line->path, err))
         return true;
     if (!line->running)
         fail(err, ERROR_SYSTEM, "starting a thread");
@@ -125,7 +115,7 @@ void line_unplug(struct line *line)
 {
     if (!line->plugged)
         return;
-    unlink(line->path);
+    unlink(line->path); // before anybody is told of a hang-up
     pthread_mutex_lock(&line->lock);
     line->stopping = true;
     pthread_mutex_unlock(&line->lock);
@@ -141,6 +131,7 @@ void line_set_fault(struct line *line, enum wire_fault fault)
     pthread_mutex_lock(&line->lock);
     line->fault = fault;
     pthread_mutex_unlock(&line->lock);
+    node_forbid(&line->node, fault == WIRE_FORBIDDEN);
     ring(line);
 }
 

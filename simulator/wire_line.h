@@ -33,7 +33,8 @@ bool line_is_plugged(const struct line *line);
 // Removes the symlink and hangs up. Accepts an unplugged line.
 void line_unplug(struct line *line);
 
-// What serve is told from now on. Any thread.
+// What serve is told from now on, and whether the line may be opened. Not while
+// it is plugged or unplugged.
 void line_set_fault(struct line *line, enum wire_fault fault);
 
 // Unplugs and ends the thread. Accepts NULL.

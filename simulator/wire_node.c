@@ -11,7 +11,7 @@
 
 bool node_open(struct node *node, struct error *err)
 {
-    *node = (struct node){.master = -1, .slave = -1};
+    *node = (struct node){.master = -1, .slave = -1, .forbidden = node->forbidden};
     if (openpty(&node->master, &node->slave, node->slave_path, NULL, NULL) != 0)
         return fail_errno(err, "opening a pseudo terminal");
     fcntl(node->master, F_SETFD, FD_CLOEXEC);
@@ -32,27 +32,38 @@ static const char unwritable[] = "/proc/sys/kernel/osrelease";
 
 static bool point_to(const char *path, const char *target)
 {
-    char fresh[512];
+    char fresh[520];
     snprintf(fresh, sizeof(fresh), "%s.new", path);
     unlink(fresh);
     return symlink(target, fresh) == 0 && rename(fresh, path) == 0;
 }
 
-bool node_link(struct node *node, UMockdevTestbed *testbed, const char *devnode,
-               struct error *err)
+static bool link_again(struct node *node)
 {
+    return point_to(node->path, node->forbidden ? unwritable : node->slave_path);
+}
+
+bool node_link(struct node *node, const char *path, struct error *err)
+{
+    snprintf(node->path, sizeof(node->path), "%s", path);
+    return link_again(node) || fail_errno(err, "linking %s", node->path);
+}
+
+bool node_link_device(struct node *node, UMockdevTestbed *testbed, const char *devnode,
+                      struct error *err)
+{
+    char path[sizeof(node->path)];
     char *root = umockdev_testbed_get_root_dir(testbed);
-    snprintf(node->path, sizeof(node->path), "%s%s", root, devnode);
+    snprintf(path, sizeof(path), "%s%s", root, devnode);
     g_free(root);
-    if (!point_to(node->path, node->slave_path))
-        return fail_errno(err, "linking %s", node->path);
-    return true;
+    return node_link(node, path, err);
 }
 
 void node_forbid(struct node *node, bool forbidden)
 {
+    node->forbidden = forbidden;
     if (node->path[0])
-        point_to(node->path, forbidden ? unwritable : node->slave_path);
+        link_again(node);
 }
 
 void node_forget_number(UMockdevTestbed *testbed, int major_number, int minor_number)
@@ -86,4 +97,5 @@ void node_close(struct node *node)
     close(node->slave);
     close(node->master);
     node->master = node->slave = -1;
+    node->path[0] = 0;
 }

@@ -13,20 +13,23 @@
 struct node {
     int master, slave;
     int major_number, minor_number; // of the slave
-    char path[256];                 // of the link inside the testbed
+    bool forbidden;
+    char path[512]; // of the link to it
     char slave_path[64];
 };
 
 // Opens the pseudo terminal, raw and not inherited by child processes.
 bool node_open(struct node *node, struct error *err);
 
-// Puts a link to it at devnode ("/dev/hidraw0") of the testbed, in place of
-// what is there.
-bool node_link(struct node *node, UMockdevTestbed *testbed, const char *devnode,
-               struct error *err);
+// Puts a link to it at path, in place of what is there.
+bool node_link(struct node *node, const char *path, struct error *err);
 
-// Whether opening the node fails with EACCES, for root as for anybody. Leaves
-// those alone that have it open.
+// The same at devnode ("/dev/hidraw0") of the testbed.
+bool node_link_device(struct node *node, UMockdevTestbed *testbed, const char *devnode,
+                      struct error *err);
+
+// Whether opening the node fails with EACCES, for root as for anybody, from now
+// on or once it is linked. Leaves those alone that have it open.
 void node_forbid(struct node *node, bool forbidden);
 
 // Whether the host may write (usbfs: whether something can be reaped).

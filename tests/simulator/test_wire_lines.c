@@ -78,6 +78,26 @@ static int open_line(const char *name)
     return fd;
 }
 
+static void without_permission_a_line_cannot_be_opened(void **state)
+{
+    (void)state;
+    static const struct {
+        enum wire_instrument instrument;
+        const char *name;
+    } lines[] = {{WIRE_INCLINOMETER, "inclinometer"}, {WIRE_RADIOMETER, "radiometer"}};
+    for (int i = 0; i < 2; i++) {
+        set_fault(lines[i].instrument, WIRE_UNPLUGGED);
+        set_fault(lines[i].instrument, WIRE_FORBIDDEN);
+        assert_int_equal(open(in_folder(lines[i].name), O_RDWR | O_NOCTTY), -1);
+        assert_int_equal(errno, EACCES);
+        set_fault(lines[i].instrument, WIRE_UNPLUGGED);
+        assert_int_equal(open(in_folder(lines[i].name), O_RDWR | O_NOCTTY), -1);
+        assert_int_equal(errno, ENOENT);
+        set_fault(lines[i].instrument, WIRE_FINE);
+        close(open_line(lines[i].name));
+    }
+}
+
 static size_t read_for(int fd, char *text, size_t size, const char *end, int timeout_ms)
 {
     size_t have = 0;
@@ -281,6 +301,7 @@ int main(int argc, char **argv)
     if (under_umockdev(argv[0]))
         return 1;
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(without_permission_a_line_cannot_be_opened),
         cmocka_unit_test(the_inclinometer_answers_through_libmodbus),
         cmocka_unit_test(the_inclinometer_s_frames_are_the_documented_ones),
         cmocka_unit_test(the_inclinometer_s_faults_show),
