@@ -10,6 +10,7 @@
 #define POLLED INSTRUMENT_RADIOMETER // those before it are polled
 
 static const int64_t OPEN_WITHIN_NS = 3 * NS_PER_S;
+static const int64_t CLOSE_WITHIN_NS = NS_PER_S;
 static const int64_t FIRST_REST_NS = 200 * NS_PER_MS;
 static const int64_t LONGEST_REST_NS = 2 * NS_PER_S;  // who comes back is seen within it
 static const int64_t SILENT_AFTER_NS = 5 * NS_PER_S;  // without a sample it is reported
@@ -43,8 +44,9 @@ struct worker {
     pthread_t thread;
     bool started;
     struct mailbox box;
-    pthread_mutex_t lock; // of report
+    pthread_mutex_t lock; // of report and due_ns
     struct instrument_report report;
+    int64_t due_ns; // deadline of the call that the driver is in, 0 = in none
     union any_sample sample;
 };
 
@@ -230,6 +232,38 @@ static void deliver(struct worker *w)
     change(w, INSTRUMENT_IS_RUNNING, NULL);
 }
 
+static void note_overdue(struct worker *w)
+{
+    int64_t late_ns = w->due_ns ? clock_now_ns() - w->due_ns : 0;
+    if (late_ns > w->report.overdue_ns)
+        w->report.overdue_ns = late_ns;
+}
+
+// From now on the driver has until due_ns; 0 when it is back.
+static void set_due(struct worker *w, int64_t due_ns)
+{
+    pthread_mutex_lock(&w->lock);
+    note_overdue(w);
+    w->due_ns = due_ns;
+    pthread_mutex_unlock(&w->lock);
+}
+
+static void *open_by(struct worker *w, int64_t deadline_ns, struct error *err)
+{
+    set_due(w, deadline_ns);
+    void *device = w->face.open(&w->all->from, deadline_ns, err);
+    set_due(w, 0);
+    return device;
+}
+
+static bool read_by(struct worker *w, void *device, int64_t deadline_ns, struct error *err)
+{
+    set_due(w, deadline_ns);
+    bool good = w->face.read(&w->all->from, device, deadline_ns, &w->sample, err);
+    set_due(w, 0);
+    return good;
+}
+
 // ---- series of raw readings ----------------------------------------------------
 
 static bool series_asked(struct acquire *a, struct series_wanted *out, uint64_t *number)
@@ -263,7 +297,10 @@ static bool take_counts(struct worker *w, void *device, const struct series_want
     if (!driver->counts)
         return fail(err, ERROR_CONFIG, "the driver %s has no raw counts", driver->name);
     while (!stopping(w->all) && clock_now_ns() < wanted->deadline_ns) {
-        if (!driver->counts(device, wanted->integration_us, wanted->deadline_ns, out, err))
+        set_due(w, wanted->deadline_ns);
+        bool good = driver->counts(device, wanted->integration_us, wanted->deadline_ns, out, err);
+        set_due(w, 0);
+        if (!good)
             return false;
         if (out->taken.earliest_ns >= wanted->asked_ns)
             return true;
@@ -328,7 +365,7 @@ static bool read_on(struct worker *w, void *device, struct error *err)
         int64_t now_ns = clock_now_ns();
         last_ns += now_ns - before_ns; // no sample was due meanwhile
         int64_t patience_ns = w->face.patience_ns(&w->sample);
-        if (w->face.read(&w->all->from, device, now_ns + patience_ns, &w->sample, err)) {
+        if (read_by(w, device, now_ns + patience_ns, err)) {
             deliver(w);
             any = true;
             last_ns = clock_now_ns();
@@ -351,12 +388,14 @@ static void *work(void *argument)
     int64_t rest_ns = FIRST_REST_NS;
     while (!stopping(w->all)) {
         struct error err = {0};
-        void *device = w->face.open(&w->all->from, clock_now_ns() + OPEN_WITHIN_NS, &err);
+        void *device = open_by(w, clock_now_ns() + OPEN_WITHIN_NS, &err);
         if (device) {
             identified(w, device);
             if (read_on(w, device, &err))
                 rest_ns = FIRST_REST_NS;
+            set_due(w, clock_now_ns() + CLOSE_WITHIN_NS);
             w->face.close(&w->all->from, device);
+            set_due(w, 0);
         }
         if (stopping(w->all))
             break;
@@ -458,6 +497,7 @@ void acquire_report(struct acquire *a, enum instrument instrument, struct instru
         return;
     struct worker *w = &a->workers[instrument];
     pthread_mutex_lock(&w->lock);
+    note_overdue(w);
     *out = w->report;
     pthread_mutex_unlock(&w->lock);
 }

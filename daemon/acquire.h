@@ -47,6 +47,7 @@ struct instrument_report {
     uint64_t samples;                    // since the start
     int64_t latest_ns;                   // of the last sample; valid when samples > 0
     char note[64];                       // of the last sample: "good", "seen", …
+    int64_t overdue_ns; // most by which the driver outlasted a deadline since the start, 0 = never
     struct error error;                  // the last one; code NONE while all is well
 };
 

@@ -229,12 +229,13 @@ static json_t *lamp_json(const struct snapshot *s)
 static json_t *instrument_json(const struct instrument_report *r, int64_t now_ns)
 {
     json_t *age = r->samples ? json_real((double)(now_ns - r->latest_ns) / NS_PER_MS) : json_null();
-    return json_pack("{s:s, s:o, s:s, s:s, s:s, s:b, s:I, s:o, s:o, s:o}", "state",
+    return json_pack("{s:s, s:o, s:s, s:s, s:s, s:b, s:I, s:o, s:o, s:o, s:f}", "state",
                      instrument_state_name(r->state), "driver", text_or_null(r->driver), "model",
                      r->identity.model, "serial", r->identity.serial, "firmware",
                      r->identity.firmware, "emulated", r->identity.emulated, "samples",
                      (json_int_t)r->samples, "age_ms", age, "note", text_or_null(r->note),
-                     "last_error", text_or_null(r->error.code ? r->error.text : ""));
+                     "last_error", text_or_null(r->error.code ? r->error.text : ""), "overdue_ms",
+                     (double)r->overdue_ns / NS_PER_MS);
 }
 
 static json_t *instruments_json(const struct instruments_report *all, int64_t now_ns)

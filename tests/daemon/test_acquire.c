@@ -267,6 +267,23 @@ static void a_driver_that_hangs_is_not_waited_for_beyond_the_deadline(void **sta
     end(a);
 }
 
+static void a_driver_that_outlasts_its_deadline_is_seen_while_it_does(void **state)
+{
+    (void)state;
+    struct acquire *a = begin(FINE);
+    await_state(a, INSTRUMENT_IS_RUNNING);
+    behave(HUNG);
+    int64_t until_ns = clock_now_ns() + PATIENCE_NS, overdue_ns = report_of(a).overdue_ns;
+    while (report_of(a).overdue_ns <= overdue_ns + STEP_NS) { // a reading has a second
+        assert_true(clock_now_ns() < until_ns);
+        clock_sleep_until_ns(clock_now_ns() + STEP_NS);
+    }
+    overdue_ns = report_of(a).overdue_ns;
+    behave(FINE);
+    end(a);
+    assert_true(overdue_ns > 0);
+}
+
 static void no_instruments_need_no_threads(void **state)
 {
     (void)state;
@@ -389,6 +406,7 @@ int main(void)
         cmocka_unit_test(an_instrument_that_is_lost_right_after_opening_is_not_hammered),
         cmocka_unit_test(a_time_out_is_no_reason_to_open_anew),
         cmocka_unit_test(stopping_wakes_a_thread_that_rests),
+        cmocka_unit_test(a_driver_that_outlasts_its_deadline_is_seen_while_it_does),
         cmocka_unit_test(a_driver_that_hangs_is_not_waited_for_beyond_the_deadline),
         cmocka_unit_test(no_instruments_need_no_threads),
         cmocka_unit_test(a_series_holds_what_was_exposed_after_it_was_asked_for),
