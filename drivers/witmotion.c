@@ -18,6 +18,7 @@ enum {
     BYTE_MS = 50, // between bytes of one reply
     SERIAL_WORDS = 6,
     MOST_FAILURES = 5,
+    PADDINGS = 8, // more than MOST_FAILURES
 };
 
 #define G_STEP (16.0 / 32768 * 9.80665) // m/s2
@@ -57,6 +58,7 @@ struct accelerometer {
     char version[8];
     char serial[2 * SERIAL_WORDS + 1];
     int failures; // reads without a sample, one after the other
+    int padding;  // words asked for beyond the map: another number after each failure
 };
 
 const struct modbus_map *witmotion_map(int model)
@@ -274,7 +276,8 @@ static bool read_map(struct accelerometer *a, int64_t deadline_ns, struct tilt_s
     uint16_t accel[MODBUS_MAP_WORDS_MOST], angle[MODBUS_MAP_WORDS_MOST];
     const struct modbus_map *map = &a->map;
     if (map->together) {
-        if (!read_registers(a, witmotion_first(map), witmotion_count(map), accel, deadline_ns, err))
+        int words = witmotion_count(map) + a->padding;
+        if (!read_registers(a, witmotion_first(map), words, accel, deadline_ns, err))
             return false;
         witmotion_decode(map, accel, a->options.offset_deg, out);
         return true;
@@ -346,6 +349,7 @@ static bool witmotion_read(struct accelerometer *a, int64_t deadline_ns, struct 
     struct tilt_sample sample = {0};
     int64_t asked = clock_now_ns();
     if (!read_map(a, deadline_ns, &sample, err)) {
+        a->padding = (a->padding + 1) % PADDINGS; // a late answer is to be known by its length
         if (++a->failures >= MOST_FAILURES && err)
             err->code = ERROR_GONE;
         return false;

@@ -139,7 +139,7 @@ static void answer(struct inclinometer *i)
         modbus_reply_exception(i->server, i->query, MODBUS_EXCEPTION_ILLEGAL_FUNCTION);
         return;
     }
-    witmotion_refresh(&i->model, now_ns);
+    witmotion_refresh(&i->model, i->answer_ns); // when it was due, however late it is
     memcpy(i->registers->tab_registers, i->model.registers, sizeof(i->model.registers));
     modbus_reply(i->server, i->query, i->query_size, i->registers);
     if (function == WRITE_ONE)

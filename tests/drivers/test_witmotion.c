@@ -264,16 +264,35 @@ static void greeting(struct script *s)
     add_step(s, ask_serial, refused, 5);
 }
 
-static void good_frame(uint8_t frame[29])
+// The map and some words after it; returns the frame's size.
+static int frame_with(int padding, uint8_t frame[64])
 {
-    uint16_t r[12] = {0};
+    uint16_t r[24] = {0};
+    int words = 12 + padding;
     set_pose(r, 45, 1, 45);
-    frame[0] = 0x50, frame[1] = 3, frame[2] = 24;
-    for (int i = 0; i < 12; i++) {
+    frame[0] = 0x50, frame[1] = 3, frame[2] = (uint8_t)(2 * words);
+    for (int i = 0; i < words; i++) {
         frame[3 + 2 * i] = r[i] >> 8;
         frame[4 + 2 * i] = r[i] & 255;
     }
-    sealed(frame, 27);
+    sealed(frame, 3 + 2 * words);
+    return 5 + 2 * words;
+}
+
+static void good_frame(uint8_t frame[29])
+{
+    uint8_t whole[64];
+    memcpy(frame, whole, (size_t)frame_with(0, whole));
+}
+
+// After so many failures.
+static const uint8_t *ask_with(int padding)
+{
+    static uint8_t request[8];
+    memcpy(request, ask_all, 6);
+    request[5] = (uint8_t)(12 + padding);
+    sealed(request, 6);
+    return request;
 }
 
 static void the_published_frames_go_over_the_wire(void **state)
@@ -310,16 +329,16 @@ static void a_bad_line_costs_readings_and_no_more(void **state)
     struct pty pty;
     struct error err = {0};
     struct tilt_sample s;
-    uint8_t good[29], broken[29], other[29];
+    uint8_t good[29], broken[29], other[29], whole[64];
     greeting(&script);
     good_frame(good);
     memcpy(broken, good, 29), broken[8] ^= 0x10;
     memcpy(other, good, 29), other[0] = 0x51, sealed(other, 27);
     add_step(&script, ask_all, broken, 29);
-    add_step(&script, ask_all, other, 29);
-    add_step(&script, ask_all, good, 11);
-    add_step(&script, ask_all, refused, 5);
-    add_step(&script, ask_all, good, 29);
+    add_step(&script, ask_with(1), other, 29);
+    add_step(&script, ask_with(2), good, 11);
+    add_step(&script, ask_with(3), refused, 5);
+    add_step(&script, ask_with(4), whole, frame_with(4, whole));
     assert_true(pty_start(&pty, play, &script));
     struct accelerometer_options options = options_for(pty.path);
     struct accelerometer *a = driver()->open(&options, soon(), &err);
@@ -331,6 +350,33 @@ static void a_bad_line_costs_readings_and_no_more(void **state)
     assert_non_null(strstr(err.text, "Illegal data address"));
     assert_true(driver()->read(a, soon(), &s, &err));
     assert_near(s.tilt_deg, 45, 0.05);
+    assert_int_equal(script.unlike, 0);
+    driver()->close(a);
+    pty_stop(&pty);
+}
+
+static void a_late_answer_does_not_pass_for_the_one_that_is_awaited(void **state)
+{
+    (void)state;
+    struct script script = {0};
+    struct pty pty;
+    struct error err = {0};
+    struct tilt_sample s;
+    uint8_t late[29], whole[64];
+    greeting(&script);
+    good_frame(late);
+    add_step(&script, ask_all, late, 0);
+    add_step(&script, ask_with(1), late, 29);
+    add_step(&script, ask_with(2), whole, frame_with(2, whole));
+    assert_true(pty_start(&pty, play, &script));
+    struct accelerometer_options options = options_for(pty.path);
+    struct accelerometer *a = driver()->open(&options, soon(), &err);
+    assert_non_null(a);
+    assert_false(driver()->read(a, clock_now_ns() + 30 * NS_PER_MS, &s, &err));
+    assert_false(driver()->read(a, soon(), &s, &err));
+    assert_int_equal(err.code, ERROR_RETRY);
+    assert_true(driver()->read(a, soon(), &s, &err));
+    assert_int_equal(script.unlike, 0);
     driver()->close(a);
     pty_stop(&pty);
 }
@@ -475,6 +521,7 @@ int main(void)
         cmocka_unit_test(a_served_sensor_is_read_and_named),
         cmocka_unit_test(the_published_frames_go_over_the_wire),
         cmocka_unit_test(a_bad_line_costs_readings_and_no_more),
+        cmocka_unit_test(a_late_answer_does_not_pass_for_the_one_that_is_awaited),
         cmocka_unit_test(a_silent_sensor_is_given_up_by_the_deadline),
         cmocka_unit_test(a_port_that_cannot_be_is_told_apart_from_one_that_is_absent),
         cmocka_unit_test(what_may_not_be_opened_names_the_udev_rules),
