@@ -141,19 +141,19 @@ static int64_t waited_ns(struct msghdr *message)
     return waited > 0 ? waited : 0;
 }
 
-// One more byte than a pose has, so that a longer datagram shows.
-static ssize_t receive(struct tracker *t, uint8_t bytes[OPENTRACK_BYTES + 1], int64_t *waited)
+// The whole length of a datagram, also when it is more than a pose has.
+static ssize_t receive(struct tracker *t, uint8_t bytes[OPENTRACK_BYTES], int64_t *waited)
 {
     union {
         struct cmsghdr header;
         char room[CMSG_SPACE(sizeof(struct timespec))];
     } control;
-    struct iovec part = {bytes, OPENTRACK_BYTES + 1};
+    struct iovec part = {bytes, OPENTRACK_BYTES};
     struct msghdr message = {.msg_iov = &part,
                              .msg_iovlen = 1,
                              .msg_control = &control,
                              .msg_controllen = sizeof control};
-    ssize_t count = recvmsg(t->fd, &message, 0);
+    ssize_t count = recvmsg(t->fd, &message, MSG_TRUNC);
     *waited = count >= 0 ? waited_ns(&message) : 0;
     return count;
 }
@@ -162,7 +162,7 @@ static ssize_t receive(struct tracker *t, uint8_t bytes[OPENTRACK_BYTES + 1], in
 // socket failed, or RETRY (why) when nothing good was there.
 static bool drain(struct tracker *t, struct head_sample *out, struct error *why)
 {
-    uint8_t bytes[OPENTRACK_BYTES + 1];
+    uint8_t bytes[OPENTRACK_BYTES];
     double pose[OPENTRACK_AXES];
     bool any = false;
     for (int i = 0; i < QUEUE_MOST; i++) {
