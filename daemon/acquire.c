@@ -12,7 +12,7 @@
 static const int64_t OPEN_WITHIN_NS = 3 * NS_PER_S;
 static const int64_t CLOSE_WITHIN_NS = NS_PER_S;
 static const int64_t FIRST_REST_NS = 200 * NS_PER_MS;
-static const int64_t LONGEST_REST_NS = 2 * NS_PER_S;  // who comes back is seen within it
+static const int64_t LONGEST_REST_NS = NS_PER_S;      // who comes back is to run within 2 s
 static const int64_t SILENT_AFTER_NS = 5 * NS_PER_S;  // without a sample it is reported
 static const int64_t REOPEN_AFTER_NS = 15 * NS_PER_S; // without a sample it is opened anew
 
@@ -264,6 +264,16 @@ static bool read_by(struct worker *w, void *device, int64_t deadline_ns, struct 
     return good;
 }
 
+// One that was lost stays so until it gives a sample: else the log would tell of
+// each try in which it can be opened and says nothing.
+static void keep_silent(struct worker *w, const struct error *err)
+{
+    pthread_mutex_lock(&w->lock);
+    enum instrument_state now = w->report.state;
+    pthread_mutex_unlock(&w->lock);
+    change(w, now == INSTRUMENT_IS_WAITING ? now : INSTRUMENT_IS_SILENT, err);
+}
+
 // ---- series of raw readings ----------------------------------------------------
 
 static bool series_asked(struct acquire *a, struct series_wanted *out, uint64_t *number)
@@ -375,7 +385,7 @@ static bool read_on(struct worker *w, void *device, struct error *err)
         if (err->code != ERROR_RETRY || now_ns - last_ns > REOPEN_AFTER_NS)
             return any;
         if (now_ns - last_ns > SILENT_AFTER_NS)
-            change(w, INSTRUMENT_IS_SILENT, err);
+            keep_silent(w, err);
         if (rest(w->all, 5 * NS_PER_MS)) // a driver may refuse at once
             break;
     }

@@ -26,8 +26,8 @@ const char *instrument_name(enum instrument instrument);
 
 #define INSTRUMENT_STATES(X)                                                                       \
     X(NONE, "none")       /* the settings name none */                                             \
-    X(WAITING, "waiting") /* not there; tried again and again */                                   \
-    X(SILENT, "silent")   /* open, but without a sample */                                         \
+    X(WAITING, "waiting") /* not there, or of no use; opened again and again */                    \
+    X(SILENT, "silent")   /* open, but without a sample for long */                                \
     X(RUNNING, "running")                                                                          \
     X(IDLE, "idle") /* on demand, nothing asked */
 
