@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// Faults of the spectrometer, and of one of two chosen by its serial number.
+#include "tests/fakes/support.h"
+
+#include "tests/whole/running.h"
+
+#include "tests/whole/faults.h"
+
+static const double LUX = 0.08; // of it: the lamp warms up by 2 %, the level is smoothed
+
+static struct row rows[] = {
+    {"silent", .effect = MUTE, .lasts_s = 20, .name = "silent-for-long"},
+    {"unplugged", .effect = GOES, .says = "no spectrometer"},
+    {"pulled-in-command", .effect = GOES},
+    {"pulled-in-spectrum", .effect = GOES},
+    {"moved", .effect = BLINKS},
+    {"blank", .effect = GOES},
+    {"forbidden", .effect = GOES, .says = "udev rules", .first = "unplugged"},
+    {"stall", .effect = RIDES},
+    {"short", .effect = MUTE},
+    {"silent", .effect = MUTE},
+    {"garbage", .effect = MUTE},
+    {"no-sync", .effect = MUTE},
+    {"bad-sync", .effect = MUTE},
+    {"out-of-step", .effect = MUTE},
+    {"other-pixels", .effect = MUTE},
+    {"overflow", .effect = MUTE},
+    {"deaf", .effect = RIDES},
+    {"deaf", .effect = RIDES, .name = "deaf-in-less-light", .light_before = 1, .light = 0.25},
+    {"deaf", .effect = MUTE, .name = "deaf-in-more-light", .light_before = 0.25, .light = 1},
+};
+
+static struct row second_rows[] = {
+    {"unplugged", .effect = RIDES, .name = "other-unplugged", .on = "spectrometer"},
+    {"unplugged", .effect = GOES, .says = "EMU2P0002"},
+};
+
+static void value(const json_t *status, double v[3], double *held_ms)
+{
+    v[0] = dig_real(status, "lamp.lux");
+    *held_ms = dig_real(status, "instruments.spectrometer.age_ms");
+}
+
+static bool is_true(const struct lane *lane, const double v[3])
+{
+    return fabs(v[0] / (lane->truth[0] * lane->light) - 1) < LUX;
+}
+
+const struct kind spectrometer_kind = {.label = "spectrometer",
+                                       .instrument = "spectrometer",
+                                       .name = "spectrometer",
+                                       .runs = "running",
+                                       .opens_ms = 500,
+                                       .rows = rows,
+                                       .count = sizeof rows / sizeof *rows,
+                                       .value = value,
+                                       .is_true = is_true};
+
+const struct kind second_spectrometer_kind = {.label = "second-spectrometer",
+                                              .instrument = "spectrometer2",
+                                              .name = "spectrometer",
+                                              .runs = "running",
+                                              .opens_ms = 500,
+                                              .rows = second_rows,
+                                              .count = sizeof second_rows / sizeof *second_rows,
+                                              .value = value,
+                                              .is_true = is_true};
