@@ -317,6 +317,7 @@ static bool pr655_read(struct radiometer *r, int64_t deadline_ns, struct radianc
 {
     struct radiance_sample sum = {0};
     struct error why = {0};
+    double luminance[RADIOMETER_AVERAGE_MOST];
     bool ok = !r->adrift || find_again(r, deadline_ns, &why);
     for (int i = 0; ok && i < r->options.average; i++) {
         struct points points;
@@ -324,7 +325,10 @@ static bool pr655_read(struct radiometer *r, int64_t deadline_ns, struct radianc
         struct interval taken;
         ok = measure(r, &points, &xyz, &taken, deadline_ns, &why) &&
              add(&sum, &points, xyz, taken, i == 0, &why);
+        luminance[i] = xyz.Y;
     }
+    if (ok && !radiometer_agree(luminance, r->options.average, err))
+        return false;
     if (ok && finish(&sum, r->options.average, &why)) {
         *out = sum;
         return true;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "drivers/radiometer.h"
 
+#include <math.h>
+
 #include "drivers/pr655.h"
 #include "drivers/spotread.h"
 
@@ -10,8 +12,9 @@
 const struct setting radiometer_settings[] = {
     {"port", SETTING_TEXT, FIELD(port), SIZE(port), .unit = "", .preset = "",
      .help = "Serial line of the spectroradiometer; empty when there is none."},
-    {"average", SETTING_INT, FIELD(average), .least = 1, .most = 99, .unit = "", .preset = "1",
-     .help = "Measurements averaged into one sample."},
+    {"average", SETTING_INT, FIELD(average), .least = 1, .most = RADIOMETER_AVERAGE_MOST,
+     .unit = "", .preset = "1",
+     .help = "Measurements averaged into one sample; they must agree within 3 %."},
     {"program", SETTING_TEXT, FIELD(program), SIZE(program), .unit = "", .preset = "spotread",
      .help = "Driver spotread: ArgyllCMS's spotread, by name or whole path."},
     {"arguments", SETTING_TEXT, FIELD(arguments), SIZE(arguments), .unit = "", .preset = "",
@@ -24,3 +27,17 @@ const struct setting radiometer_settings[] = {
 
 const struct radiometer_driver *const radiometer_drivers[] = {&pr655_driver, &spotread_driver,
                                                               NULL};
+
+bool radiometer_agree(const double *luminance, int count, struct error *err)
+{
+    const double relative = 0.03, least = 0.02;
+    double mean = 0, lowest = luminance[0], highest = luminance[0];
+    for (int i = 0; i < count; i++) {
+        mean += luminance[i] / count;
+        lowest = fmin(lowest, luminance[i]);
+        highest = fmax(highest, luminance[i]);
+    }
+    return fmax(highest - mean, mean - lowest) <= fmax(relative * fabs(mean), least) ||
+           fail(err, ERROR_RETRY, "%d readings of %.4g to %.4g cd/m2 do not agree", count, lowest,
+                highest);
+}

@@ -15,9 +15,11 @@ struct radiance_sample {
     struct spectrum radiance; // on the inner grid
 };
 
+enum { RADIOMETER_AVERAGE_MOST = 99 };
+
 struct radiometer_options {
     char port[128]; // serial line, "" = none
-    int average;    // readings per sample, 1..99
+    int average;    // readings per sample, 1..RADIOMETER_AVERAGE_MOST
     // spotread only:
     char program[128];   // name or path
     char arguments[256]; // more options, separated by blanks
@@ -42,5 +44,10 @@ struct radiometer_driver {
 };
 
 extern const struct radiometer_driver *const radiometer_drivers[];
+
+// Whether the readings (Y, cd/m2) that make one sample may be of one light: each
+// within 3 % of their mean, or 0.02 cd/m2 where that is more, far above what
+// such instruments repeat to. Else RETRY: light that flickers, a misreading.
+bool radiometer_agree(const double *luminance, int count, struct error *err);
 
 #endif

@@ -277,6 +277,7 @@ static bool spotread_read(struct radiometer *r, int64_t deadline_ns, struct radi
                           struct error *err)
 {
     struct radiance_sample sum = {0};
+    double luminance[RADIOMETER_AVERAGE_MOST];
     struct error own;
     err = err ? err : &own;
     for (int i = 0; i < r->options.average; i++) {
@@ -284,8 +285,10 @@ static bool spotread_read(struct radiometer *r, int64_t deadline_ns, struct radi
         struct interval taken = {0};
         if (!read_once(r, &g, &taken, deadline_ns, err) || !add(&sum, &g, taken, i == 0, err))
             return false;
+        luminance[i] = g.xyz.Y;
     }
-    if (!finish(&sum, r->options.average, err))
+    if (!radiometer_agree(luminance, r->options.average, err) ||
+        !finish(&sum, r->options.average, err))
         return false;
     *out = sum;
     return true;

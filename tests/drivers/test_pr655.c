@@ -110,13 +110,15 @@ static void a_spectrum_is_checked_by_its_content(void **state)
 }
 
 // What the far end does. One letter of mood per measurement: '.' good,
-// 'w' weak light, 'o' overload, 's' silence, 'c' cut short, 'j' junk.
+// 'w' weak light, 'o' overload, 's' silence, 'c' cut short, 'j' junk, 'm' misread.
 struct peer {
     const char *moods;
     int step_nm;       // 4 as PR-655, 2 as PR-670
     bool header_apart; // status on a line of its own
     int measured, commands, left_remote, remote;
-    double scale; // of the radiance, grows with each measurement
+    double misread;
+    double scale;  // of the radiance, grows with each measurement
+    double growth; // from the second one on; 0 = 1
 };
 
 static void say(struct pty *pty, const char *text)
@@ -144,7 +146,8 @@ static void measure(struct pty *pty, struct peer *peer)
 {
     char mood = peer->measured < (int)strlen(peer->moods) ? peer->moods[peer->measured] : '.';
     peer->measured++;
-    peer->scale += 1;
+    peer->scale += peer->growth > 0 && peer->measured > 1 ? peer->growth : 1;
+    peer->misread = mood == 'm' ? 1.1 : 1;
     if (mood == 'w')
         say(pty, "-0008\r\n");
     else if (mood == 'o')
@@ -173,8 +176,9 @@ static void answer(struct pty *pty, struct peer *peer, const char *command)
     } else if (!strcmp(command, "M5")) {
         measure(pty, peer);
     } else if (!strcmp(command, "D2")) {
-        snprintf(text, sizeof text, "00000,0,%.3e,%.3e,%.3e\r\n", 90 * peer->scale,
-                 100 * peer->scale, 80 * peer->scale);
+        double scale = peer->scale * peer->misread;
+        snprintf(text, sizeof text, "00000,0,%.3e,%.3e,%.3e\r\n", 90 * scale, 100 * scale,
+                 80 * scale);
         say(pty, text);
     } else {
         say(pty, "-1000\r\n");
@@ -249,7 +253,7 @@ static void a_measurement_gives_spectrum_and_xyz(void **state)
 static void averaging_takes_the_mean_of_several_measurements(void **state)
 {
     (void)state;
-    struct peer peer = {.moods = "", .step_nm = 4};
+    struct peer peer = {.moods = "", .step_nm = 4, .growth = 0.02};
     struct pty pty;
     struct error err = {0};
     struct radiance_sample s;
@@ -260,10 +264,38 @@ static void averaging_takes_the_mean_of_several_measurements(void **state)
     assert_string_equal(err.text, "");
     assert_true(ok);
     assert_int_equal(peer.measured, 3);
-    assert_near(s.xyz.Y, 200, arithmetic);
-    assert_near(s.raw[0], 2 * radiance_at(380), sent_digits * radiance_at(380));
+    assert_near(s.xyz.Y, 102, arithmetic);
+    assert_near(s.raw[0], 1.02 * radiance_at(380), sent_digits * radiance_at(380));
     driver()->close(r);
     pty_stop(&pty);
+}
+
+static void measurements_that_do_not_agree_make_no_sample(void **state)
+{
+    (void)state;
+    struct peer peer = {.moods = ".m", .step_nm = 4, .growth = 0.02};
+    struct pty pty;
+    struct error err = {0};
+    struct radiance_sample s;
+    assert_true(pty_start(&pty, play, &peer));
+    struct radiometer *r = open_at(pty.path, 2, &err);
+    assert_non_null(r);
+    assert_false(driver()->read(r, soon(), &s, &err));
+    assert_int_equal(err.code, ERROR_RETRY);
+    assert_non_null(strstr(err.text, "2 readings of 100 to 112.2 cd/m2 do not agree"));
+    assert_true(driver()->read(r, soon(), &s, &err));
+    assert_near(s.xyz.Y, 105, arithmetic);
+    driver()->close(r);
+    pty_stop(&pty);
+}
+
+static void the_least_light_may_scatter_more(void **state)
+{
+    (void)state;
+    assert_true(radiometer_agree((double[]){0.08, 0.1}, 2, NULL));
+    assert_false(radiometer_agree((double[]){0.8, 1.0}, 2, NULL));
+    assert_true(radiometer_agree((double[]){0.98, 1.02, 1}, 3, NULL));
+    assert_true(radiometer_agree((double[]){-0.01}, 1, NULL));
 }
 
 static void after_every_mishap_the_next_measurement_is_good(void **state)
@@ -370,6 +402,8 @@ int main(void)
         cmocka_unit_test(a_spectrum_is_checked_by_its_content),
         cmocka_unit_test(a_measurement_gives_spectrum_and_xyz),
         cmocka_unit_test(averaging_takes_the_mean_of_several_measurements),
+        cmocka_unit_test(measurements_that_do_not_agree_make_no_sample),
+        cmocka_unit_test(the_least_light_may_scatter_more),
         cmocka_unit_test(after_every_mishap_the_next_measurement_is_good),
         cmocka_unit_test(silence_ends_at_the_deadline),
         cmocka_unit_test(characters_are_sent_one_by_one_with_gaps),
