@@ -137,12 +137,13 @@ static const struct setting state_rows[] = {
      "Time constant over which a resting tilt is smoothed."},
     {"eye_s", SETTING_DOUBLE, AT(state.eye_s), 0, 0, 10, "s", NULL, "0.1",
      "Time constant over which the place of a resting eye is smoothed (one-euro)."},
-    {"eye_filter", SETTING_ENUM, AT(state.eye_filter), 0, 0, 0, "", eye_filter_names, "one-euro",
-     "How the place of the eye is smoothed: steadiest at rest (one-euro), or nearest while it "
-     "moves "
-     "(kalman)."},
-    {"eye_noise_m", SETTING_DOUBLE, AT(state.eye_noise_m), 0, 0.0001, 0.1, "m", NULL, "0.005",
-     "Noise of one place as the tracker sees it (kalman)."},
+    {"eye_filter", SETTING_ENUM, AT(state.eye_filter), 0, 0, 0, "", eye_filter_names, "kalman",
+     "How the place of the eye is smoothed: nearest while it moves (kalman), or steadiest at rest "
+     "(one-euro)."},
+    {"eye_noise_m", SETTING_DOUBLE, AT(state.eye_noise_m), 0, 0.0001, 0.1, "m", NULL, "0.002",
+     "Noise of one place as the tracker sees it, across its line of sight (kalman)."},
+    {"eye_depth_noise_m", SETTING_DOUBLE, AT(state.eye_depth_noise_m), 0, 0.0001, 0.1, "m", NULL,
+     "0.008", "Noise of one place along the tracker's line of sight (kalman)."},
     {"eye_acceleration", SETTING_DOUBLE, AT(state.eye_acceleration), 0, 0.01, 100, "m/s2", NULL,
      "8", "How hard a head accelerates, from one sample to the next (kalman)."},
     {"eye_ahead_s", SETTING_DOUBLE, AT(state.eye_ahead_s), 0, 0, 0.05, "s", NULL, "0.03",

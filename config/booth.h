@@ -57,7 +57,8 @@ struct state_settings {
     double tilt_s;           // 0..10: time constant of the tilt
     int eye_filter;          // enum eye_filter
     double eye_s;            // 0..10: time constant of the resting eye, one-euro
-    double eye_noise_m;      // 0.0001..0.1: of one place seen, kalman
+    double eye_noise_m;      // 0.0001..0.1: of one place seen, across the line of sight, kalman
+    double eye_depth_noise_m; // 0.0001..0.1: along it
     double eye_acceleration; // 0.01..100 m/s2: of a head, kalman
     double eye_ahead_s;      // 0..0.05: from a frame's start to its light; 0 = the eye as last seen
     double dark_lux;         // 0..1000: below it no lamp is on

@@ -12,6 +12,10 @@ static const double FIRST_SPEED = 0.5;                   // m/s, of a head just 
 static const double HORIZON_S = 0.05;
 static const double REST_SPEED = 0.05; // m/s
 static const double FASTEST = 3;       // m/s
+static const double STIR = 0.1;        // m/s: noise alone may look like that
+static const double LIVELY = 0.25;     // m/s: from here on a head may do anything
+static const double REST_SHARE = 0.1;  // of its acceleration, of one that rests
+static const double FORGET_S = 0.5;    // a swaying head turns around within it
 
 static double seconds(int64_t ns)
 {
@@ -41,24 +45,50 @@ static void one_euro(struct eye_track *t, double rest_s, struct vec3 at, double 
     t->at = towards(t->at, at, share_of(dt_s, rest_s / (1 + faster)));
 }
 
-static void kalman(struct eye_track *t, const struct state_settings *s, struct vec3 at, double dt)
+// What is believed after dt, and how much of what a place is off counts for
+// place and speed.
+static void gain(struct eye_spread *k, double speed, double most, double noise, double dt,
+                 double *place, double *pull)
 {
-    double noise = s->eye_noise_m * s->eye_noise_m;
-    double q = s->eye_acceleration * s->eye_acceleration;
-    t->at = vec3_add(t->at, vec3_scale(t->speed, dt));
-    t->pp += dt * (2 * t->pv + dt * t->vv) + q * dt * dt * dt * dt / 4;
-    t->pv += dt * t->vv + q * dt * dt * dt / 2;
-    t->vv += q * dt * dt;
-    double place_gain = t->pp / (t->pp + noise), speed_gain = t->pv / (t->pp + noise);
-    struct vec3 off = vec3_sub(at, t->at);
-    t->at = vec3_add(t->at, vec3_scale(off, place_gain));
-    t->speed = vec3_add(t->speed, vec3_scale(off, speed_gain));
-    t->vv -= speed_gain * t->pv;
-    t->pv -= place_gain * t->pv;
-    t->pp -= place_gain * t->pp;
+    k->pace = fmax(speed, k->pace * exp(-dt / FORGET_S));
+    double share = fmin(fmax((k->pace - STIR) / (LIVELY - STIR), REST_SHARE), 1);
+    double q = share * most * share * most;
+    k->pp += dt * (2 * k->pv + dt * k->vv) + q * dt * dt * dt * dt / 4;
+    k->pv += dt * k->vv + q * dt * dt * dt / 2;
+    k->vv += q * dt * dt;
+    *place = k->pp / (k->pp + noise * noise);
+    *pull = k->pv / (k->pp + noise * noise);
+    k->vv -= *pull * k->pv;
+    k->pv -= *place * k->pv;
+    k->pp -= *place * k->pp;
 }
 
-void eye_take(struct eye_track *t, const struct state_settings *s, struct vec3 at, int64_t seen_ns)
+static void kalman(struct eye_track *t, const struct state_settings *s, struct vec3 at,
+                   struct vec3 sight, double dt)
+{
+    double place[2], pull[2];
+    sight = vec3_unit(sight);
+    struct vec3 along = vec3_scale(sight, vec3_dot(t->speed, sight));
+    struct vec3 across = vec3_sub(t->speed, along);
+    gain(&t->along, vec3_length(along), s->eye_acceleration, s->eye_depth_noise_m, dt, &place[0],
+         &pull[0]);
+    gain(&t->across, vec3_length(across), s->eye_acceleration, s->eye_noise_m, dt, &place[1],
+         &pull[1]);
+    t->at = vec3_add(t->at, vec3_scale(t->speed, dt));
+    struct vec3 off = vec3_sub(at, t->at), deep = vec3_scale(sight, vec3_dot(off, sight));
+    struct vec3 wide = vec3_sub(off, deep);
+    t->at = vec3_add(t->at, vec3_add(vec3_scale(deep, place[0]), vec3_scale(wide, place[1])));
+    t->speed = vec3_add(t->speed, vec3_add(vec3_scale(deep, pull[0]), vec3_scale(wide, pull[1])));
+}
+
+static struct eye_spread unknown(double noise)
+{
+    return (struct eye_spread){
+        .pp = noise * noise, .vv = FIRST_SPEED * FIRST_SPEED, .pace = FIRST_SPEED};
+}
+
+void eye_take(struct eye_track *t, const struct state_settings *s, struct vec3 at,
+              struct vec3 sight, int64_t seen_ns)
 {
     double passed_s = seconds(seen_ns - t->seen_ns);
     double dt_s = fmin(fmax(passed_s, SHORTEST_S), LONGEST_S);
@@ -66,8 +96,8 @@ void eye_take(struct eye_track *t, const struct state_settings *s, struct vec3 a
     if (!t->known || passed_s < 0 || passed_s >= s->eye_hold_s) {
         *t = (struct eye_track){.known = true,
                                 .at = at,
-                                .pp = s->eye_noise_m * s->eye_noise_m,
-                                .vv = FIRST_SPEED * FIRST_SPEED};
+                                .along = unknown(s->eye_depth_noise_m),
+                                .across = unknown(s->eye_noise_m)};
         seen = at;
     }
     t->seen_ns = seen_ns;
@@ -80,7 +110,7 @@ void eye_take(struct eye_track *t, const struct state_settings *s, struct vec3 a
         one_euro(t, s->eye_s, at, dt_s);
         break;
     case EYE_FILTER_KALMAN:
-        kalman(t, s, at, dt_s);
+        kalman(t, s, at, sight, dt_s);
         return;
     }
     t->speed = towards(t->speed, speed_between(seen, at, dt_s), share_of(dt_s, SPEED_S));

@@ -200,7 +200,8 @@ static void take_head(struct estimator *e, const struct samples *seen, int64_t n
         e->eye.usable = false;
         return;
     }
-    eye_take(&e->track, &e->limits, at, middle(&h->taken));
+    struct vec3 sight = vec3_sub(at, e->booth_from_tracker.translation);
+    eye_take(&e->track, &e->limits, at, sight, middle(&h->taken));
     double px = isfinite(h->reprojection_px) ? h->reprojection_px : INFINITY;
     remember(&e->eye, &h->taken, now_ns, 1 / (1 + px * px));
 }
