@@ -3,6 +3,7 @@
 
 #include <complex.h>
 #include <math.h>
+#include <string.h>
 
 static const struct vec3 models[][POSE_POINTS] = {
     {{0, 0.040, -0.030}, {0, 0, 0}, {0, -0.070, -0.080}},           // clip: top, middle, bottom
@@ -11,6 +12,7 @@ static const struct vec3 models[][POSE_POINTS] = {
 
 static const double nearest_m = 0.15, farthest_m = 3;
 static const double most_residual_px = 4;
+static const double most_off_px = 15; // of a marker by the pose of three others, unrefined
 static const double most_turn = 75 * M_PI / 180; // from facing the camera, any axis
 static const double most_roll = 50 * M_PI / 180; // within the image
 static const double most_unlike = 0.15;          // of the blobs' shape, 0..1
@@ -19,14 +21,21 @@ static const double turn_step = 20 * M_PI / 180; // between the heads tried at f
 static const double handicap_per_step = 0.005;   // so that a strange turn needs a reason
 static const double pull_per_m = 5;              // rad of rotation a metre is worth
 static const double alike = 0.1;                 // rad
+static const double cost_per_px = 0.2;           // rad: four markers tell by themselves
+static const double fourth_share = 0.1;          // of what is expected, then
 static const double same_eye_m = 0.015;
 static const double jump_m = 0.10, speed_m_s = 3; // faster is no head
 static const int64_t memory_ns = NS_PER_S;
 enum { JUMPS_BELIEVED = 3, MATCHES = 24, CANDIDATES = POSE_MOST + 1, CHOICES = 64 };
 
-const struct vec3 *head_markers(int marker)
+struct head_markers head_markers(int marker, const double fourth_m[3])
 {
-    return models[marker];
+    struct head_markers m = {.count = POSE_POINTS};
+    memcpy(m.at, models[marker], sizeof models[marker]);
+    m.at[POSE_POINTS] = (struct vec3){fourth_m[0], fourth_m[1], fourth_m[2]};
+    if (vec3_length(m.at[POSE_POINTS]) > 0)
+        m.count = POSE_POINTS_MOST;
+    return m;
 }
 
 // How far three blobs differ in shape from three projected markers, place,
@@ -69,8 +78,8 @@ static struct rigid facing(const double (*image)[2])
 
 // One order of three blobs as the markers, and how well it fits.
 struct match {
-    double image[POSE_POINTS][2];
-    struct rigid guess; // the pose whose projection it resembles most
+    double image[POSE_POINTS_MOST][2]; // the blob left over last, when there is one
+    struct rigid guess;                // the pose whose projection it resembles most
     double unlike;
 };
 
@@ -113,6 +122,8 @@ static void list_orders(const double (*blobs)[2], int count, struct matches *m)
             one->image[i][0] = blobs[at[i]][0];
             one->image[i][1] = blobs[at[i]][1];
         }
+        if (count == HEAD_BLOBS)
+            memcpy(one->image[POSE_POINTS], blobs[6 - at[0] - at[1] - at[2]], sizeof *blobs);
     }
 }
 
@@ -140,17 +151,17 @@ static double assign(const struct head_memory *memory, const struct vec3 *marker
 }
 
 // Root mean square distance between blobs and projected markers.
-static double residual(const struct vec3 *markers, const double image[POSE_POINTS][2],
+static double residual(const struct vec3 *markers, const double (*image)[2], int count,
                        const struct rigid *pose)
 {
     double sum = 0;
-    for (int i = 0; i < POSE_POINTS; i++) {
+    for (int i = 0; i < count; i++) {
         struct vec3 p = rigid_apply(*pose, markers[i]);
         if (!(p.z > 0))
             return INFINITY;
         sum += pow(p.x / p.z - image[i][0], 2) + pow(p.y / p.z - image[i][1], 2);
     }
-    return sqrt(sum / POSE_POINTS);
+    return sqrt(sum / count);
 }
 
 static double angle_between(struct mat3 a, struct mat3 b)
@@ -182,28 +193,108 @@ static double cost_of(const struct head_memory *memory, const struct rigid *pose
     return angle_between(pose->rotation, memory->pose.rotation) + pull_per_m * vec3_length(moved);
 }
 
-// The plausible poses of all orders that fit nearly as well as the best,
-// cheapest first.
-static int choose(const struct head_memory *memory, const struct vec3 *markers,
+static int insert(struct choice *choices, int kept, const struct choice *one)
+{
+    int at = kept;
+    if (kept == CHOICES)
+        return kept;
+    for (; at > 0 && choices[at - 1].cost > one->cost; at--)
+        choices[at] = choices[at - 1];
+    choices[at] = *one;
+    return kept + 1;
+}
+
+// The plausible poses of an order, cheapest first.
+static int choose(const struct head_memory *memory, const struct head_markers *markers,
                   const struct match *match, double focal_px, struct choice *choices, int kept)
 {
     const double(*image)[2] = match->image;
     struct rigid found[CANDIDATES], front = facing(image);
-    int count = pose_candidates(markers, image, found);
+    int count = pose_candidates(markers->at, image, found);
     found[count++] = match->guess;
     for (int i = 0; i < count && kept < CHOICES; i++) {
-        if (!pose_refine(markers, image, &found[i]))
+        if (!pose_refine(markers->at, image, POSE_POINTS, &found[i]))
             continue;
         struct choice one = {found[i], cost_of(memory, &found[i], &front),
-                             focal_px * residual(markers, image, &found[i])};
-        if (!plausible(&one, &front))
-            continue;
-        int at = kept++;
-        for (; at > 0 && choices[at - 1].cost > one.cost; at--)
-            choices[at] = choices[at - 1];
-        choices[at] = one;
+                             focal_px * residual(markers->at, image, POSE_POINTS, &found[i])};
+        if (plausible(&one, &front))
+            kept = insert(choices, kept, &one);
     }
     return kept;
+}
+
+// Poses of three of four markers.
+static int candidates_of(const struct head_markers *markers, const double (*image)[2],
+                         const int which[POSE_POINTS], struct rigid out[POSE_MOST])
+{
+    struct vec3 model[POSE_POINTS];
+    double three[POSE_POINTS][2];
+    for (int i = 0; i < POSE_POINTS; i++) {
+        model[i] = markers->at[which[i]];
+        memcpy(three[i], image[which[i]], sizeof three[i]);
+    }
+    return pose_candidates(model, three, out);
+}
+
+// Four markers as one order of four blobs: any three may be in one line for the camera.
+static int choose_four(const struct head_memory *memory, const struct head_markers *markers,
+                       const struct match *match, double focal_px, struct choice *choices, int kept)
+{
+    static const int threes[][POSE_POINTS] = {{0, 2, 3}, {1, 2, 3}, {0, 1, 3}};
+    const double(*image)[2] = match->image;
+    struct rigid found[POSE_MOST], front = facing(image);
+    for (size_t t = 0; t < sizeof threes / sizeof *threes; t++) {
+        int count = candidates_of(markers, image, threes[t], found);
+        for (int i = 0; i < count; i++) {
+            struct rigid *pose = &found[i];
+            if (focal_px * residual(markers->at, image, POSE_POINTS_MOST, pose) > most_off_px ||
+                !pose_refine(markers->at, image, POSE_POINTS_MOST, pose))
+                continue;
+            struct choice one = {*pose, 0,
+                                 focal_px * residual(markers->at, image, POSE_POINTS_MOST, pose)};
+            one.cost = cost_per_px * one.residual_px + fourth_share * cost_of(memory, pose, &front);
+            if (plausible(&one, &front))
+                kept = insert(choices, kept, &one);
+        }
+    }
+    return kept;
+}
+
+// The order that the last pose would show.
+static int expected_order(const struct head_memory *memory, const struct head_markers *markers,
+                          const struct matches *m)
+{
+    int nearest = 0;
+    double least = INFINITY;
+    for (int i = 0; i < m->count; i++) {
+        double off = residual(markers->at, m->of[i].image, POSE_POINTS_MOST, &memory->pose);
+        nearest = off < least ? i : nearest;
+        least = fmin(off, least);
+    }
+    return nearest;
+}
+
+static int choose_of_four(const struct head_memory *memory, const struct head_markers *markers,
+                          const struct matches *m, double focal_px, struct choice *choices)
+{
+    int found = 0;
+    if (memory->known)
+        found = choose_four(memory, markers, &m->of[expected_order(memory, markers, m)], focal_px,
+                            choices, 0);
+    for (int i = 0; i < m->count && !(memory->known && found); i++)
+        found = choose_four(memory, markers, &m->of[i], focal_px, choices, found);
+    return found;
+}
+
+static int choose_of_three(const struct head_memory *memory, const struct head_markers *markers,
+                           const struct matches *m, double best, double focal_px,
+                           struct choice *choices)
+{
+    int found = 0;
+    for (int i = 0; i < m->count; i++)
+        if (m->of[i].unlike <= best + nearly_alike)
+            found = choose(memory, markers, &m->of[i], focal_px, choices, found);
+    return found;
 }
 
 static bool undecided(const struct choice *choices, int count, struct vec3 eye_from_marker)
@@ -226,13 +317,12 @@ static bool jumped(struct head_memory *memory, struct vec3 moved, int64_t now_ns
     return ++memory->jumps <= JUMPS_BELIEVED;
 }
 
-void head_solve(struct head_memory *memory, const struct vec3 *markers, struct vec3 eye_from_marker,
-                const double (*blobs)[2], int count, double focal_px, int64_t now_ns,
-                struct head_sample *out)
+void head_solve(struct head_memory *memory, const struct head_markers *markers,
+                struct vec3 eye_from_marker, const double (*blobs)[2], int count, double focal_px,
+                int64_t now_ns, struct head_sample *out)
 {
     struct matches matches;
     struct choice choices[CHOICES];
-    int found = 0;
     out->markers = count;
     out->eye = (struct vec3){0, 0, 0};
     out->reprojection_px = 0;
@@ -241,13 +331,15 @@ void head_solve(struct head_memory *memory, const struct vec3 *markers, struct v
         *memory = (struct head_memory){0};
     if (count < POSE_POINTS)
         return;
-    double best = assign(memory, markers, blobs, count, &matches);
-    if (best > most_unlike)
+    double best = assign(memory, markers->at, blobs, count, &matches);
+    int found = 0;
+    if (count == HEAD_BLOBS && markers->count == POSE_POINTS_MOST)
+        found = choose_of_four(memory, markers, &matches, focal_px, choices);
+    if (!found && best > most_unlike)
         return;
     out->status = TRACKER_AMBIGUOUS;
-    for (int i = 0; i < matches.count; i++)
-        if (matches.of[i].unlike <= best + nearly_alike)
-            found = choose(memory, markers, &matches.of[i], focal_px, choices, found);
+    if (!found)
+        found = choose_of_three(memory, markers, &matches, best, focal_px, choices);
     if (!found || undecided(choices, found, eye_from_marker))
         return;
     struct rigid pose = choices[0].pose;

@@ -8,18 +8,18 @@
 namespace
 {
 
-std::vector<cv::Point3d> points_of(const struct vec3 *model)
+std::vector<cv::Point3d> points_of(const struct vec3 *model, int count)
 {
     std::vector<cv::Point3d> points;
-    for (int i = 0; i < POSE_POINTS; i++)
+    for (int i = 0; i < count; i++)
         points.emplace_back(model[i].x, model[i].y, model[i].z);
     return points;
 }
 
-std::vector<cv::Point2d> pixels_of(const double image[POSE_POINTS][2])
+std::vector<cv::Point2d> pixels_of(const double (*image)[2], int count)
 {
     std::vector<cv::Point2d> pixels;
-    for (int i = 0; i < POSE_POINTS; i++)
+    for (int i = 0; i < count; i++)
         pixels.emplace_back(image[i][0], image[i][1]);
     return pixels;
 }
@@ -52,8 +52,8 @@ int pose_candidates(const struct vec3 model[POSE_POINTS], const double image[POS
 try {
     std::vector<cv::Mat> rotations, translations;
     int count = 0;
-    cv::solveP3P(points_of(model), pixels_of(image), cv::Matx33d::eye(), cv::noArray(), rotations,
-                 translations, cv::SOLVEPNP_P3P);
+    cv::solveP3P(points_of(model, POSE_POINTS), pixels_of(image, POSE_POINTS), cv::Matx33d::eye(),
+                 cv::noArray(), rotations, translations, cv::SOLVEPNP_P3P);
     for (size_t i = 0; i < rotations.size() && count < POSE_MOST; i++) {
         struct rigid pose = rigid_of(rotations[i], translations[i]);
         if (finite(pose))
@@ -64,8 +64,7 @@ try {
     return 0;
 }
 
-bool pose_refine(const struct vec3 model[POSE_POINTS], const double image[POSE_POINTS][2],
-                 struct rigid *pose)
+bool pose_refine(const struct vec3 *model, const double (*image)[2], int count, struct rigid *pose)
 try {
     cv::Mat matrix(3, 3, CV_64F), rotation, translation(3, 1, CV_64F);
     for (int r = 0; r < 3; r++)
@@ -76,8 +75,9 @@ try {
     translation.at<double>(2) = pose->translation.z;
     cv::Rodrigues(matrix, rotation);
     cv::solvePnPRefineLM(
-        points_of(model), pixels_of(image), cv::Matx33d::eye(), cv::noArray(), rotation,
-        translation, cv::TermCriteria(cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 40, 1e-12));
+        points_of(model, count), pixels_of(image, count), cv::Matx33d::eye(), cv::noArray(),
+        rotation, translation,
+        cv::TermCriteria(cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 40, 1e-12));
     struct rigid refined = rigid_of(rotation, translation);
     if (!finite(refined))
         return false;

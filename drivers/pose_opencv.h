@@ -13,7 +13,7 @@
 extern "C" {
 #endif
 
-enum { POSE_POINTS = 3, POSE_MOST = 4 };
+enum { POSE_POINTS = 3, POSE_POINTS_MOST = 4, POSE_MOST = 4 };
 
 // All poses (camera_from_model) that explain the image, by P3P (Gao 2003, in
 // OpenCV's solveP3P); returns how many, 0..4. None when the points are
@@ -21,10 +21,9 @@ enum { POSE_POINTS = 3, POSE_MOST = 4 };
 int pose_candidates(const struct vec3 model[POSE_POINTS], const double image[POSE_POINTS][2],
                     struct rigid out[POSE_MOST]);
 
-// Moves *pose to the nearest minimum of the reprojection error by
+// Moves *pose to the nearest minimum of the reprojection error of 3..4 points by
 // Levenberg-Marquardt. False, and *pose untouched, when that fails.
-bool pose_refine(const struct vec3 model[POSE_POINTS], const double image[POSE_POINTS][2],
-                 struct rigid *pose);
+bool pose_refine(const struct vec3 *model, const double (*image)[2], int count, struct rigid *pose);
 
 #ifdef __cplusplus
 }

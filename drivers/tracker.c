@@ -30,6 +30,10 @@ const struct setting tracker_settings[] = {
      .preset = "3", .help = "Sensitivity of the camera, 6 is the greatest."},
     {"marker", SETTING_ENUM, FIELD(marker), .unit = "", .choices = tracker_markers,
      .preset = "clip", .help = "Which set of three markers the observer wears."},
+    {"fourth_m", SETTING_VECTOR, FIELD(fourth_m), 3, -1, 1, .unit = "m", .preset = "0 0 0",
+     .help =
+         "Place of a fourth marker from the marker origin: observer's right, up, into the head; "
+         "0 0 0 is none. It tells poses apart that three markers leave open."},
     {"eye_from_marker_m", SETTING_VECTOR, FIELD(eye_from_marker_m), 3, -1, 1, .unit = "m",
      .preset = "0 0 0",
      .help = "From the marker origin to the midpoint of the eyes: observer's right, up, into the "

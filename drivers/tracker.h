@@ -31,10 +31,11 @@ struct head_sample {
 };
 
 struct tracker_options {
-    char serial[64];     // "" = first
-    double fov_deg;      // horizontal field of view of the camera, 10..120 (42)
-    int sensitivity;     // 1..5, 6 = greatest
-    int marker;          // index into tracker_markers
+    char serial[64];             // "" = first
+    double fov_deg;              // horizontal field of view of the camera, 10..120 (42)
+    int sensitivity;             // 1..5, 6 = greatest
+    int marker;                  // index into tracker_markers
+    double fourth_m[3];          // place of a fourth marker, marker frame; 0 0 0 = none
     double eye_from_marker_m[3]; // marker origin to the midpoint of the eyes, marker frame
     // opentrack only:
     char address[64];   // numeric IPv4 address to listen at

@@ -62,6 +62,7 @@ struct tracker {
     struct tracker_options options;
     hid_device *hid;
     char model[64], serial[64];
+    struct head_markers markers;
     struct head_memory memory;
     int silent;         // reads without a report, one after the other
     bool mode_lost;     // other reports came, or none: the camera may have lost its settings too
@@ -253,6 +254,7 @@ static struct tracker *wiimote_open(const struct tracker_options *options, int64
         return NULL;
     }
     t->options = *options;
+    t->markers = head_markers(options->marker, options->fourth_m);
     t->blind_ns = clock_now_ns();
     t->blind_limit_ms = BLIND_MS;
     if (find(t, err) && set_up(t, deadline_ns, err))
@@ -308,8 +310,8 @@ static bool wiimote_read(struct tracker *t, int64_t deadline_ns, struct head_sam
     for (int i = 0; i < WIIMOTE_BLOBS; i++)
         if (blobs[i].seen)
             wiimote_direction(blobs[i], focal, directions[seen++]);
-    head_solve(&t->memory, head_markers(t->options.marker),
-               (struct vec3){offset[0], offset[1], offset[2]}, directions, seen, focal, now, out);
+    head_solve(&t->memory, &t->markers, (struct vec3){offset[0], offset[1], offset[2]}, directions,
+               seen, focal, now, out);
     return cure_blindness(t, seen, deadline_ns, err);
 }
 
