@@ -94,9 +94,9 @@ static bool counts_at_start_only(const char *section, const char *key)
     static const char *const sections[] = {"screen", "spectrometer", "accelerometer", "radiometer",
                                            "control"};
     static const char *const keys[] = {
-        "display.output", "display.monitor",  "display.fullscreen",       "display.bits",
-        "tracker.driver", "tracker.serial",   "tracker.fov_deg",          "tracker.sensitivity",
-        "tracker.marker", "tracker.fourth_m", "tracker.eye_from_marker_m"};
+        "display.output", "display.monitor", "display.fullscreen", "display.bits",
+        "tracker.driver", "tracker.serial",  "tracker.fov_deg",    "tracker.sensitivity",
+        "tracker.format", "tracker.marker",  "tracker.fourth_m",   "tracker.eye_from_marker_m"};
     char whole[96];
     snprintf(whole, sizeof whole, "%s.%s", section, key);
     for (size_t i = 0; i < sizeof sections / sizeof *sections; i++)

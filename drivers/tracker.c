@@ -20,6 +20,7 @@ const char *tracker_status_name(enum tracker_status status)
 }
 
 const char *const tracker_markers[] = {"clip", "cap", NULL};
+const char *const tracker_formats[] = {"extended", "basic", "full", NULL};
 
 const struct setting tracker_settings[] = {
     {"serial", SETTING_TEXT, FIELD(serial), SIZE(serial), .unit = "", .preset = "",
@@ -28,6 +29,9 @@ const struct setting tracker_settings[] = {
      .preset = "42", .help = "Horizontal field of view; calibrate per unit."},
     {"sensitivity", SETTING_INT, FIELD(sensitivity), .least = 1, .most = 6, .unit = "",
      .preset = "3", .help = "Sensitivity of the camera, 6 is the greatest."},
+    {"format", SETTING_ENUM, FIELD(format), .unit = "", .choices = tracker_formats,
+     .preset = "extended",
+     .help = "How the camera writes its blobs; all give the same places, full half as often."},
     {"marker", SETTING_ENUM, FIELD(marker), .unit = "", .choices = tracker_markers,
      .preset = "clip", .help = "Which set of three markers the observer wears."},
     {"fourth_m", SETTING_VECTOR, FIELD(fourth_m), 3, -1, 1, .unit = "m", .preset = "0 0 0",

@@ -34,6 +34,7 @@ struct tracker_options {
     char serial[64];             // "" = first
     double fov_deg;              // horizontal field of view of the camera, 10..120 (42)
     int sensitivity;             // 1..5, 6 = greatest
+    int format;                  // index into tracker_formats: how the camera writes its blobs
     int marker;                  // index into tracker_markers
     double fourth_m[3];          // place of a fourth marker, marker frame; 0 0 0 = none
     double eye_from_marker_m[3]; // marker origin to the midpoint of the eyes, marker frame
@@ -46,6 +47,7 @@ struct tracker_options {
 
 extern const struct setting tracker_settings[];
 extern const char *const tracker_markers[]; // "clip", "cap", NULL
+extern const char *const tracker_formats[]; // "extended", "basic", "full", NULL
 
 struct tracker;
 

@@ -20,14 +20,16 @@ enum {
     OUT_WRITE = 0x16,
     OUT_CAMERA_LOGIC = 0x1a,
     IN_ACKNOWLEDGE = 0x22,
-    IN_CORE_ACCEL_CAMERA = 0x33,
+    IN_EXTENDED = 0x33,
+    IN_BASIC = 0x37,
+    IN_FULL_FIRST = 0x3e,
+    IN_FULL_SECOND = 0x3f,
     ENABLE = 0x04,
     CONTINUOUS = 0x04,
     SPACE_REGISTERS = 0x04,
-    CAMERA_EXTENDED = 3,
     CAMERA_RUN = 0x08,
-    REPORT_BYTES = 18, // number, 2 buttons, 3 acceleration, 4 x 3 camera
-    CAMERA_OFFSET = 6,
+    FULL_BLOB_BYTES = 9,
+    BASIC_PAIR_BYTES = 5,
     WRITE_MOST = 16,
     PACE_MS = 30,     // between writes of the initialisation
     SILENCE_MS = 250, // after which the mode is asserted again
@@ -40,6 +42,17 @@ enum {
 
 static const uint32_t reg_run = 0xb00030, reg_block1 = 0xb00000, reg_block2 = 0xb0001a,
                       reg_mode = 0xb00033;
+
+// Which mode of the camera belongs to which report, and where its blobs begin.
+static const struct {
+    uint8_t mode, report;
+    size_t bytes, offset;
+    int frame_ms; // that the reports of one frame may lie apart
+} formats[] = {
+    [WIIMOTE_EXTENDED] = {3, IN_EXTENDED, 18, 6, 0}, // number, buttons, acceleration, blobs
+    [WIIMOTE_BASIC] = {1, IN_BASIC, 22, 6, 0},       // the same, and an extension
+    [WIIMOTE_FULL] = {5, IN_FULL_FIRST, 22, 4, 10},
+};
 
 static const struct {
     uint8_t block1[9], block2[2];
@@ -81,17 +94,53 @@ struct wiimote_blob wiimote_decode(const uint8_t b[3])
     return blob;
 }
 
-bool wiimote_report(const uint8_t *report, size_t count, struct wiimote_blob blobs[WIIMOTE_BLOBS],
-                    struct error *err)
+void wiimote_decode_basic(const uint8_t b[5], struct wiimote_blob out[2])
 {
-    if (count < 1 || report[0] != IN_CORE_ACCEL_CAMERA)
+    out[0] = (struct wiimote_blob){.x = b[0] | (b[2] & 0x30) << 4, .y = b[1] | (b[2] & 0xc0) << 2};
+    out[1] = (struct wiimote_blob){.x = b[3] | (b[2] & 0x03) << 8, .y = b[4] | (b[2] & 0x0c) << 6};
+    for (int i = 0; i < 2; i++)
+        out[i].seen = out[i].y < WIIMOTE_HEIGHT;
+}
+
+static bool belongs(enum wiimote_format format, uint8_t report)
+{
+    return report == formats[format].report || (format == WIIMOTE_FULL && report == IN_FULL_SECOND);
+}
+
+static bool take_full(const uint8_t *report, const uint8_t *blobs, struct wiimote_frame *frame)
+{
+    bool second = report[0] == IN_FULL_SECOND, whole = second && frame->half;
+    for (int i = 0; i < 2; i++)
+        frame->blobs[i + 2 * second] = wiimote_decode(blobs + FULL_BLOB_BYTES * i);
+    frame->half = !second;
+    return whole;
+}
+
+bool wiimote_report(enum wiimote_format format, const uint8_t *report, size_t count,
+                    struct wiimote_frame *frame, bool *whole, struct error *err)
+{
+    if (count < 1 || !belongs(format, report[0]))
         return fail(err, ERROR_DATA, "report %02x instead of %02x", count ? report[0] : 0,
-                    IN_CORE_ACCEL_CAMERA);
-    if (count < REPORT_BYTES)
-        return fail(err, ERROR_DATA, "report of %zu bytes instead of %d", count, REPORT_BYTES);
-    for (int i = 0; i < WIIMOTE_BLOBS; i++)
-        blobs[i] = wiimote_decode(report + CAMERA_OFFSET + 3 * i);
-    return true;
+                    formats[format].report);
+    if (count < formats[format].bytes)
+        return fail(err, ERROR_DATA, "report of %zu bytes instead of %zu", count,
+                    formats[format].bytes);
+    const uint8_t *blobs = report + formats[format].offset;
+    *whole = true;
+    switch (format) {
+    case WIIMOTE_EXTENDED:
+        for (int i = 0; i < WIIMOTE_BLOBS; i++)
+            frame->blobs[i] = wiimote_decode(blobs + 3 * i);
+        return true;
+    case WIIMOTE_BASIC:
+        for (int i = 0; i < WIIMOTE_BLOBS; i += 2)
+            wiimote_decode_basic(blobs + BASIC_PAIR_BYTES * i / 2, &frame->blobs[i]);
+        return true;
+    case WIIMOTE_FULL:
+        *whole = take_full(report, blobs, frame);
+        return true;
+    }
+    return false;
 }
 
 double wiimote_focal_px(double fov_deg)
@@ -117,7 +166,8 @@ static bool put(struct tracker *t, const uint8_t *report, size_t count, struct e
 
 static bool assert_mode(struct tracker *t, struct error *err)
 {
-    return put(t, (const uint8_t[]){OUT_MODE, CONTINUOUS, IN_CORE_ACCEL_CAMERA}, 3, err);
+    return put(t, (const uint8_t[]){OUT_MODE, CONTINUOUS, formats[t->options.format].report}, 3,
+               err);
 }
 
 // Lets PACE_MS pass while reading; *refused when an acknowledgement says so.
@@ -163,7 +213,7 @@ static bool enable(struct tracker *t, uint8_t what, int64_t deadline_ns, struct 
 static bool set_up(struct tracker *t, int64_t deadline_ns, struct error *err)
 {
     const int level = t->options.sensitivity - 1;
-    const uint8_t run = CAMERA_RUN, mode = CAMERA_EXTENDED;
+    const uint8_t run = CAMERA_RUN, mode = formats[t->options.format].mode;
     return enable(t, OUT_CAMERA_CLOCK, deadline_ns, err) &&
            enable(t, OUT_CAMERA_LOGIC, deadline_ns, err) &&
            poke(t, reg_run, &run, 1, deadline_ns, err) &&
@@ -273,18 +323,20 @@ static bool forget_backlog(struct tracker *t, struct error *err)
     return count >= 0 || gone(err);
 }
 
-static bool fresh_blobs(struct tracker *t, int64_t deadline_ns,
-                        struct wiimote_blob blobs[WIIMOTE_BLOBS], struct error *err)
+static bool fresh_blobs(struct tracker *t, int64_t deadline_ns, struct wiimote_frame *frame,
+                        struct error *err)
 {
+    const enum wiimote_format format = (enum wiimote_format)t->options.format;
     struct error why = {0};
     for (int wait; (wait = deadline_ms(deadline_ns, SILENCE_MS)) > 0;) {
         uint8_t r[32];
+        bool whole = false;
         int count = hid_read_timeout(t->hid, r, sizeof r, wait);
         if (count < 0)
             return gone(err);
-        if (count > 0 && wiimote_report(r, (size_t)count, blobs, &why))
+        if (count > 0 && wiimote_report(format, r, (size_t)count, frame, &whole, &why) && whole)
             return true;
-        if (count > 0 && r[0] == IN_CORE_ACCEL_CAMERA)
+        if (count > 0 && belongs(format, r[0]))
             continue;
         t->mode_lost = true;
         if (!assert_mode(t, err))
@@ -298,18 +350,19 @@ static bool fresh_blobs(struct tracker *t, int64_t deadline_ns,
 static bool wiimote_read(struct tracker *t, int64_t deadline_ns, struct head_sample *out,
                          struct error *err)
 {
-    struct wiimote_blob blobs[WIIMOTE_BLOBS];
+    struct wiimote_frame frame = {0};
     double directions[WIIMOTE_BLOBS][2], focal = wiimote_focal_px(t->options.fov_deg);
     const double *offset = t->options.eye_from_marker_m;
     int seen = 0;
-    if (!forget_backlog(t, err) || !fresh_blobs(t, deadline_ns, blobs, err))
+    if (!forget_backlog(t, err) || !fresh_blobs(t, deadline_ns, &frame, err))
         return false;
     t->silent = 0;
     int64_t now = clock_now_ns();
-    out->taken = (struct interval){now - TRAVEL_MS * NS_PER_MS, now};
+    int travel_ms = TRAVEL_MS + formats[t->options.format].frame_ms;
+    out->taken = (struct interval){now - travel_ms * NS_PER_MS, now};
     for (int i = 0; i < WIIMOTE_BLOBS; i++)
-        if (blobs[i].seen)
-            wiimote_direction(blobs[i], focal, directions[seen++]);
+        if (frame.blobs[i].seen)
+            wiimote_direction(frame.blobs[i], focal, directions[seen++]);
     head_solve(&t->memory, &t->markers, (struct vec3){offset[0], offset[1], offset[2]}, directions,
                seen, focal, now, out);
     return cure_blindness(t, seen, deadline_ns, err);
