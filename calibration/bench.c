@@ -129,11 +129,12 @@ bool bench_reload(struct bench *b, struct error *err)
     return done(daemon_call(b, json_pack("{ss}", "do", CONTROL_RELOAD), err));
 }
 
-static bool take_spectrum(const json_t *reply, struct spectrum *out, struct error *err)
+static bool take_spectrum(const json_t *reply, const char *key, struct spectrum *out,
+                          struct error *err)
 {
-    const json_t *values = json_object_get(reply, "irradiance");
+    const json_t *values = json_object_get(reply, key);
     if (json_array_size(values) != SPECTRUM_COUNT)
-        return fail(err, ERROR_DATA, "the reply has no irradiance of %d values", SPECTRUM_COUNT);
+        return fail(err, ERROR_DATA, "the reply has no %s of %d values", key, SPECTRUM_COUNT);
     for (size_t i = 0; i < SPECTRUM_COUNT; i++)
         out->v[i] = json_number_value(json_array_get(values, i));
     return true;
@@ -170,7 +171,8 @@ bool bench_teach(struct bench *b, const char *lamp, int readings, struct taught 
                  struct error *err)
 {
     json_t *reply = teach_call(b, lamp, readings, err);
-    if (!reply || !take_spectrum(reply, &out->irradiance, err)) {
+    if (!reply || !take_spectrum(reply, "irradiance", &out->irradiance, err) ||
+        !take_spectrum(reply, "sigma", &out->sigma, err)) {
         json_decref(reply);
         return while_doing(err, "teaching lamp %s", lamp);
     }

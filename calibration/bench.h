@@ -64,6 +64,7 @@ void bench_instrument(const json_t *reply, char *name, size_t size);
 // A lamp as its spectrometer saw it.
 struct taught {
     struct spectrum irradiance; // W m-2 nm-1
+    struct spectrum sigma;      // its standard uncertainty, 0 where none is known
     double spread, lux;         // relative rms of the readings; illuminance
     char instrument[128];       // model and serial
 };

@@ -144,7 +144,17 @@ void teach_average(const struct spectrum *readings, int count, struct spectrum *
 
 // ---- teaching ------------------------------------------------------------------
 
-// Good readings that began after this call.
+void teach_sigma(const struct spectrum *sigmas, int count, struct spectrum *sigma)
+{
+    for (int k = 0; k < SPECTRUM_COUNT; k++) {
+        double squares = 0;
+        for (int i = 0; i < count; i++)
+            squares += sigmas[i].v[k] * sigmas[i].v[k];
+        sigma->v[k] = sqrt(squares / count);
+    }
+}
+
+// Good readings that began after this call, and behind all of them their sigmas.
 static bool gather(struct desk *d, const struct job *job, struct spectrum *readings,
                    struct error *err)
 {
@@ -160,9 +170,10 @@ static bool gather(struct desk *d, const struct job *job, struct spectrum *readi
         bool another = seen->spectrum_number != last;
         last = seen->spectrum_number;
         if (another && seen->spectrum.taken.earliest_ns >= begun_ns &&
-            seen->spectrum.status == SPECTROMETER_GOOD)
+            seen->spectrum.status == SPECTROMETER_GOOD) {
+            readings[job->readings + count] = seen->spectrum.sigma;
             readings[count++] = seen->spectrum.irradiance;
-        else
+        } else
             clock_sleep_until_ns(now_ns + SAMPLE_POLL_NS);
     }
     free(seen);
@@ -174,7 +185,7 @@ static bool gather(struct desk *d, const struct job *job, struct spectrum *readi
 static void teach(struct desk *d, struct job *job)
 {
     struct instrument_report from;
-    struct spectrum mean, *readings = calloc(job->readings, sizeof *readings);
+    struct spectrum mean, sigma, *readings = calloc(2 * (size_t)job->readings, sizeof *readings);
     double spread;
     acquire_report(d->instruments, INSTRUMENT_SPECTROMETER, &from);
     if (!readings)
@@ -183,13 +194,15 @@ static void teach(struct desk *d, struct job *job)
         fail(&job->err, ERROR_CONFIG, "the settings name no spectrometer");
     else if (gather(d, job, readings, &job->err)) {
         teach_average(readings, job->readings, &mean, &spread);
+        teach_sigma(readings + job->readings, job->readings, &sigma);
         json_t *nm = json_array();
         for (int i = 0; i < SPECTRUM_COUNT; i++)
             json_array_append_new(nm, json_integer(SPECTRUM_FIRST_NM + i));
         job->reply =
-            json_pack("{s:s, s:i, s:o, s:o, s:f, s:f}", "lamp", job->name, "readings",
+            json_pack("{s:s, s:i, s:o, s:o, s:o, s:f, s:f}", "lamp", job->name, "readings",
                       job->readings, "nm", nm, "irradiance", numbers(mean.v, SPECTRUM_COUNT),
-                      "spread", spread, "lux", xyz_absolute(&mean, OBSERVER_1931_2).Y);
+                      "sigma", numbers(sigma.v, SPECTRUM_COUNT), "spread", spread, "lux",
+                      xyz_absolute(&mean, OBSERVER_1931_2).Y);
         add_identity(job->reply, &from.identity);
     }
     free(readings);

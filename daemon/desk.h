@@ -23,6 +23,10 @@ struct jobs *desk_jobs(struct desk *desk);
 // Any thread.
 void desk_report(struct desk *desk, struct instrument_report *out);
 
+// Standard uncertainty of the mean of readings whose own are sigmas: their rms. It does not fall
+// with their number, for most of it is the calibration's, common to all.
+void teach_sigma(const struct spectrum *sigmas, int count, struct spectrum *sigma);
+
 // What teaching makes of readings: their mean, the rms of what each is off
 // relative to the rms of the mean, both over all wavelengths. count >= 1.
 void teach_average(const struct spectrum *readings, int count, struct spectrum *mean,

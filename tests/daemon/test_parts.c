@@ -143,6 +143,19 @@ static void the_average_of_readings_is_their_mean_and_rms_spread(void **state)
     assert_near(spread, 0, 0);
 }
 
+static void the_uncertainty_of_a_mean_is_no_less_than_the_calibrations(void **state)
+{
+    (void)state;
+    struct spectrum sigmas[2], sigma;
+    for (int i = 0; i < SPECTRUM_COUNT; i++) {
+        sigmas[0].v[i] = 3 + i;
+        sigmas[1].v[i] = i % 2 ? 3 + i : 0;
+    }
+    teach_sigma(sigmas, 2, &sigma);
+    assert_near(sigma.v[1], 4, EXACT); // two alike are as uncertain as one
+    assert_near(sigma.v[0], 3 / sqrt(2), EXACT);
+}
+
 // ---- command lines ---------------------------------------------------------
 
 static bool parse(struct boothd_options *o, struct error *err, const char *a, const char *b,
@@ -232,6 +245,7 @@ int main(void)
         cmocka_unit_test(jobs_come_in_order_and_their_answers_too),
         cmocka_unit_test(more_jobs_than_can_wait_are_refused),
         cmocka_unit_test(the_average_of_readings_is_their_mean_and_rms_spread),
+        cmocka_unit_test(the_uncertainty_of_a_mean_is_no_less_than_the_calibrations),
         cmocka_unit_test(boothd_finds_its_settings_and_takes_its_options),
         cmocka_unit_test(boothd_refuses_what_it_does_not_know),
         cmocka_unit_test(a_negative_number_is_a_number_and_no_option),

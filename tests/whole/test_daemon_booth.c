@@ -309,6 +309,9 @@ static void teach(const char *lamp)
         s.v[i] = json_number_value(json_array_get(dig(reply, "irradiance"), i));
     assert_near(real(reply, "lux"), xyz_absolute(&s, OBSERVER_1931_2).Y, 1e-6 * real(reply, "lux"));
     assert_true(real(reply, "spread") > 0 && real(reply, "spread") < 0.05);
+    const json_t *sigma = json_array_get(dig(reply, "sigma"), 555 - SPECTRUM_FIRST_NM);
+    assert_true(json_number_value(sigma) > 0);
+    assert_true(json_number_value(sigma) < 0.05 * s.v[555 - SPECTRUM_FIRST_NM]);
     snprintf(name, sizeof name, "run/lamps/%s.sp", lamp);
     folder_put(&here, name, "");
     write_spectrum(folder_at(&here, name), &s);
