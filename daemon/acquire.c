@@ -28,6 +28,7 @@ struct face {
     int64_t (*patience_ns)(const void *sample); // for one reading, after this one
     const struct interval *(*taken)(const void *sample);
     const char *(*note)(const void *sample);
+    bool (*doubts)(const void *sample); // that its note is worth a line of the log when it lasts
     size_t size;
 };
 
@@ -47,6 +48,7 @@ struct worker {
     pthread_mutex_t lock; // of report and due_ns
     struct instrument_report report;
     int64_t due_ns; // deadline of the call that the driver is in, 0 = in none
+    struct doubt doubt;
     union any_sample sample;
 };
 
@@ -124,6 +126,7 @@ const char *instrument_state_name(enum instrument_state state)
                              kind##_patience,                                                      \
                              kind##_taken,                                                         \
                              kind##_note,                                                          \
+                             kind##_doubts,                                                        \
                              sizeof(type)};                                                        \
     }
 
@@ -161,6 +164,24 @@ static const char *accelerometer_note(const void *sample)
 static const char *tracker_note(const void *sample)
 {
     return tracker_status_name(((const struct head_sample *)sample)->status);
+}
+
+static bool spectrometer_doubts(const void *sample)
+{
+    (void)sample; // lamps come and go
+    return false;
+}
+
+// A stand that is turned shakes, but not for long.
+static bool accelerometer_doubts(const void *sample)
+{
+    return ((const struct tilt_sample *)sample)->doubt != TILT_NONE;
+}
+
+static bool tracker_doubts(const void *sample)
+{
+    (void)sample; // so do observers
+    return false;
 }
 
 FACE(spectrometer, struct spectrum_sample)
@@ -221,6 +242,37 @@ static void identified(struct worker *w, void *device)
     pthread_mutex_unlock(&w->lock);
 }
 
+enum doubt_news doubt_step(struct doubt *d, bool doubts, int64_t now_ns)
+{
+    if (!doubts) {
+        enum doubt_news news = d->told ? DOUBT_OVER : DOUBT_NO_NEWS;
+        *d = (struct doubt){0};
+        return news;
+    }
+    if (!d->lasts)
+        *d = (struct doubt){.lasts = true, .since_ns = now_ns};
+    if (d->told || now_ns - d->since_ns <= SILENT_AFTER_NS)
+        return DOUBT_NO_NEWS;
+    d->told = true;
+    return DOUBT_LASTS;
+}
+
+static void log_doubt(struct worker *w)
+{
+    const char *name = instrument_name(w->instrument);
+    switch (doubt_step(&w->doubt, w->face.doubts(&w->sample), clock_now_ns())) {
+    case DOUBT_NO_NEWS:
+        return;
+    case DOUBT_LASTS:
+        log_line(LOG_LEVEL_WARNING, "%s: its samples are passed over: %s", name,
+                 w->face.note(&w->sample));
+        return;
+    case DOUBT_OVER:
+        log_line(LOG_LEVEL_NOTICE, "%s: its samples are good again", name);
+        return;
+    }
+}
+
 static void deliver(struct worker *w)
 {
     mailbox_post(&w->box, &w->sample);
@@ -230,6 +282,7 @@ static void deliver(struct worker *w)
     snprintf(w->report.note, sizeof w->report.note, "%s", w->face.note(&w->sample));
     pthread_mutex_unlock(&w->lock);
     change(w, INSTRUMENT_IS_RUNNING, NULL);
+    log_doubt(w);
 }
 
 static void note_overdue(struct worker *w)

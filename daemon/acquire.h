@@ -63,9 +63,21 @@ struct acquire_from {
 
 struct acquire_from acquire_from(const struct booth_settings *settings);
 
+// Samples that are good for nothing: said once when it lasts for 5 s, and once
+// when it is over. Zeroed at the start.
+struct doubt {
+    bool lasts, told;
+    int64_t since_ns;
+};
+
+enum doubt_news { DOUBT_NO_NEWS, DOUBT_LASTS, DOUBT_OVER };
+
+enum doubt_news doubt_step(struct doubt *doubt, bool doubts, int64_t now_ns);
+
 struct acquire;
 
-// Starts the threads. They log one line per change of an instrument's state.
+// Starts the threads. They log one line per change of an instrument's state, and
+// one of doubt (such as a wrong map of an inclinometer).
 // NULL with err (SYSTEM).
 struct acquire *acquire_start(const struct acquire_from *from, struct error *err);
 
