@@ -36,8 +36,8 @@
 #define CONTROL_FAULT "fault"           // instrument, kind
 #define CONTROL_PROTRACTOR "protractor" // -> deg, the screen's tilt as a protractor reads it
 #define CONTROL_TAPE "tape"             // x_m, y_m on the screen -> point_m as a tape measures it
-#define CONTROL_PHOTOGRAPH                                                                         \
-    "photograph" // folder -> an exposure series of the ceiling in it
+#define CONTROL_PHOTOGRAPH "photograph" // folder -> an exposure series of the ceiling in it
+#define CONTROL_RADIANCE "radiance"     // -> what a radiometer aimed there sees, W m-2 sr-1 nm-1
 
 struct control_client;
 

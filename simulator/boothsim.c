@@ -13,6 +13,8 @@
 #include "simulator/boothsim_children.h"
 #include "simulator/photograph.h"
 #include "simulator/screen_xvfb.h"
+#include "simulator/spotread_link.h"
+#include "simulator/spotread_program.h"
 #include "simulator/wire.h"
 #include "simulator/world_control.h"
 
@@ -30,7 +32,8 @@ static const char usage[] =
     "\n"
     "  --scenario FILE       what the booth is made of (INI)\n"
     "  --run DIR             where the instruments' lines, the lamps' luminance maps\n"
-    "                        and the control socket boothsim.sock are left\n"
+    "                        and the control socket boothsim.sock are left, and\n"
+    "                        spotread, a program that measures with an emulated one\n"
     "  --lamp NAME=SPECTRUM  gives a lamp another spectrum, or adds a lamp; a CIE name\n"
     "                        or a file (CSV nm, power; or .sp); may be repeated\n"
     "  --script FILE         timed events, instead of the scenario's\n"
@@ -259,6 +262,19 @@ static void on_fault(void *context, int instrument, int fault)
     wire_set_fault(b->wire, (enum wire_instrument)instrument, (enum wire_fault)fault);
 }
 
+static void offer_spotread(struct booth *b, json_t *answer)
+{
+    const struct scenario *s = &b->scenario;
+    struct spotread_settings settings = {
+        .kind = (enum spotread_kind)s->spotread.model,
+        .seed = (uint64_t)s->world.seed,
+        .hurry = s->radiometer.hurry,
+        .lapses = {s->radiometer.drift, s->radiometer.misread_every},
+    };
+    strcpy(settings.serial, s->spotread.serial);
+    spotread_offer(answer, &settings, b->wire);
+}
+
 static json_t *on_request(void *context, const char *what, json_t *request, struct error *err)
 {
     struct booth *b = context;
@@ -268,6 +284,8 @@ static json_t *on_request(void *context, const char *what, json_t *request, stru
         return folder ? photograph(b->world, now, folder, err)
                       : (fail(err, ERROR_CONFIG, "folder: is missing or no text"), NULL);
     json_t *answer = world_answer(b->world, now, what, request, err);
+    if (answer && !strcmp(what, CONTROL_RADIANCE))
+        offer_spotread(b, answer);
     world_faults_due(b->world, now, on_fault, b);
     return answer;
 }
@@ -283,7 +301,7 @@ static bool bring_up(struct booth *b, struct error *err)
     if (!write_maps(b, err) || !start_screen(b, err) || !plug_in(b, err))
         return false;
     b->server = control_listen(path, err);
-    return b->server != NULL;
+    return b->server && spotread_leave(run, err);
 }
 
 static void forward_signal(struct booth *b, int64_t *kill_at_ns)
@@ -326,6 +344,8 @@ static bool live(struct booth *b, int *status, struct error *err)
 static void take_down(struct booth *b)
 {
     child_stop(&b->command, clock_now_ns() + stop_patience_ns);
+    if (b->server)
+        spotread_take_away(b->options->run);
     control_unlisten(b->server);
     wire_stop(b->wire);
     xvfb_screen_close(&b->screen);
@@ -387,6 +407,8 @@ int main(int argc, char **argv)
     struct options options;
     int status;
     log_init("boothsim", LOG_LEVEL_INFO);
+    if (argc > 2 && !strcmp(argv[1], "--spotread"))
+        return spotread_run(argv[2], !getenv("ARGYLL_NOT_INTERACTIVE"), argc - 3, argv + 3);
     if (!parse_options(argc, argv, &options, &status))
         return status;
     if (!getenv(wrapped))

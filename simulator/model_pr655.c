@@ -11,6 +11,7 @@
 #include "base/clock.h"
 #include "colorimetry/colour.h"
 #include "simulator/model_noise.h"
+#include "simulator/model_slit.h"
 
 enum status {
     STATUS_OK = 0,
@@ -127,13 +128,8 @@ static void look(struct pr655 *d, int64_t now_ns, double points[PR655_POINTS])
 {
     struct spectrum light;
     d->options.around.radiance(d->options.around.context, now_ns, &light);
-    for (int i = 0; i < PR655_POINTS; i++) {
-        int centre = PR655_FIRST_NM + i * PR655_STEP_NM - SPECTRUM_FIRST_NM;
-        points[i] = 0;
-        for (int o = 1 - BANDPASS_NM; o < BANDPASS_NM; o++)
-            points[i] += light.v[centre + o] * (BANDPASS_NM - abs(o)) /
-                         (BANDPASS_NM * BANDPASS_NM);
-    }
+    for (int i = 0; i < PR655_POINTS; i++)
+        points[i] = slit_mean(&light, PR655_FIRST_NM + i * PR655_STEP_NM, BANDPASS_NM);
 }
 
 static double peak_of(const double points[PR655_POINTS], int *at)

@@ -8,6 +8,7 @@
 #include "simulator/model_ooi_kind.h"
 #include "simulator/model_witmotion.h"
 #include "simulator/sensor.h"
+#include "simulator/spotread_meter.h"
 
 #define DOUBLE(f, lo, hi, unit, preset, help)                                                      \
     {                                                                                              \
@@ -221,6 +222,19 @@ static const struct setting radiometer_rows[] = {
     {0},
 };
 #undef OWNER
+#define OWNER scenario_spotread
+static const char *const spotreads[] = {
+#define X(name, text) text,
+    SPOTREAD_KINDS(X)
+#undef X
+        NULL};
+static const struct setting spotread_rows[] = {
+    {"model", SETTING_ENUM, offsetof(struct OWNER, model), 0, 0, 0, "", spotreads, "specbos",
+     "Which instrument the emulated spotread drives."},
+    TEXT(serial, "EMUSPOT1", "Its serial number."),
+    {0},
+};
+#undef OWNER
 #define OWNER scenario_inclinometer
 static const char *const inclinometers[] = {
 #define X(name, text) text,
@@ -265,7 +279,7 @@ static const struct setting lamp_rows[] = {
 };
 #undef OWNER
 
-enum { SECTIONS = 15, SECTIONS_ALL = SECTIONS + SCENARIO_LAMPS_MOST + 1 };
+enum { SECTIONS = 16, SECTIONS_ALL = SECTIONS + SCENARIO_LAMPS_MOST + 1 };
 
 static const char *const lamp_sections[SCENARIO_LAMPS_MOST] = {"lamp1", "lamp2", "lamp3",
                                                                "lamp4", "lamp5", "lamp6"};
@@ -286,6 +300,7 @@ static void sections_of(struct scenario *s, struct settings_section out[SECTIONS
         {"spectrometer", spectrometer_rows, &s->spectrometer},
         {"spectrometer2", spectrometer_2_rows, &s->spectrometer_2},
         {"radiometer", radiometer_rows, &s->radiometer},
+        {"spotread", spotread_rows, &s->spotread},
         {"inclinometer", inclinometer_rows, &s->inclinometer},
         {"tracker", tracker_rows, &s->tracker},
     };
@@ -365,6 +380,7 @@ static bool check(const struct scenario *s, struct error *err)
     return check_serial("spectrometer", s->spectrometer.serial, err) &&
            (!*second || check_serial("spectrometer2", second, err)) &&
            check_serial("radiometer", s->radiometer.serial, err) &&
+           check_serial("spotread", s->spotread.serial, err) &&
            check_serial("inclinometer", s->inclinometer.serial, err) &&
            check_serial("tracker", s->tracker.serial, err);
 }

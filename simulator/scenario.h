@@ -122,6 +122,12 @@ struct scenario_radiometer {
     char serial[SCENARIO_NAME_SIZE];
 };
 
+// The instrument of the emulated spotread; its times and lapses are the radiometer's.
+struct scenario_spotread {
+    int model; // enum spotread_kind
+    char serial[SCENARIO_NAME_SIZE];
+};
+
 struct scenario_serial {
     char serial[SCENARIO_NAME_SIZE];
 };
@@ -157,6 +163,7 @@ struct scenario {
     struct scenario_panel panel;
     struct scenario_spectrometer spectrometer;
     struct scenario_radiometer radiometer;
+    struct scenario_spotread spotread;
     struct scenario_spectrometer_2 spectrometer_2;
     struct scenario_inclinometer inclinometer;
     struct scenario_serial tracker;

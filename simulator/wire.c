@@ -40,10 +40,12 @@ struct wire {
     struct radiometer_end *radiometer;
     struct line *radiometer_line;
     struct opentrack_end *opentrack; // may not run
+    bool spotread_plugged;           // its instrument
 
     pthread_mutex_t lock; // plugs and pulls one at a time; guards what follows
     enum wire_fault fault[WIRE_COUNT];
     int64_t shows_ns[WIRE_COUNT]; // plugged in and not enumerated yet; 0 = neither
+    int pulled[WIRE_COUNT];       // times
 };
 
 // ---- making ------------------------------------------------------------------------
@@ -175,6 +177,8 @@ static bool plug(struct wire *w, enum wire_instrument instrument, struct error *
         return line_plug(w->radiometer_line, err);
     case WIRE_OPENTRACK: // a program has no plug
         return true;
+    case WIRE_SPOTREAD:
+        return w->spotread_plugged = true;
     case WIRE_COUNT:
         break;
     }
@@ -196,6 +200,8 @@ static bool is_plugged(const struct wire *w, enum wire_instrument instrument)
         return line_is_plugged(w->radiometer_line);
     case WIRE_OPENTRACK:
         return true;
+    case WIRE_SPOTREAD:
+        return w->spotread_plugged;
     case WIRE_COUNT:
         break;
     }
@@ -204,7 +210,7 @@ static bool is_plugged(const struct wire *w, enum wire_instrument instrument)
 
 static double enumeration_s(const struct wire *w, enum wire_instrument instrument)
 {
-    if (1u << instrument & (WIRE_ON_USB | WIRE_ON_HID))
+    if (1u << instrument & (WIRE_ON_USB | WIRE_ON_HID | WIRE_ON_PROCESS))
         return w->options.enumeration_s;
     return w->inclinometer_tcp && instrument == WIRE_INCLINOMETER ? 0
                                                                   : w->options.line_enumeration_s;
@@ -231,6 +237,9 @@ static void unplug(struct wire *w, enum wire_instrument instrument)
         line_unplug(w->radiometer_line);
         break;
     case WIRE_OPENTRACK:
+        break;
+    case WIRE_SPOTREAD:
+        w->spotread_plugged = false;
         break;
     case WIRE_COUNT:
         break;
@@ -294,6 +303,8 @@ static void set_fault(struct wire *w, enum wire_instrument instrument, enum wire
     case WIRE_OPENTRACK:
         opentrack_end_set_fault(w->opentrack, fault);
         break;
+    case WIRE_SPOTREAD: // asks for it
+        break;
     case WIRE_COUNT:
         break;
     }
@@ -338,6 +349,7 @@ void wire_set_fault(struct wire *wire, enum wire_instrument instrument, enum wir
     w->fault[instrument] = fault;
     if (fault == WIRE_UNPLUGGED) {
         w->shows_ns[instrument] = 0;
+        w->pulled[instrument]++;
         unplug(w, instrument);
     } else {
         if (1u << instrument & WIRE_ON_USB)
@@ -348,6 +360,17 @@ void wire_set_fault(struct wire *wire, enum wire_instrument instrument, enum wir
     }
     set_fault(w, instrument, fault);
     pthread_mutex_unlock(&w->lock);
+}
+
+enum wire_fault wire_fault_of(struct wire *wire, enum wire_instrument instrument, int *pulled)
+{
+    pthread_mutex_lock(&wire->lock);
+    enum wire_fault fault = wire->fault[instrument];
+    if (!is_plugged(wire, instrument))
+        fault = WIRE_UNPLUGGED;
+    *pulled = wire->pulled[instrument];
+    pthread_mutex_unlock(&wire->lock);
+    return fault;
 }
 
 void wire_enumerate(struct wire *wire, int64_t now_ns)
@@ -364,7 +387,7 @@ void wire_enumerate(struct wire *wire, int64_t now_ns)
 static bool check(const struct wire_options *o, struct error *err)
 {
     for (int i = 0; i < WIRE_COUNT; i++)
-        if (i == WIRE_OPENTRACK || !is_there(o, (enum wire_instrument)i))
+        if (i == WIRE_OPENTRACK || i == WIRE_SPOTREAD || !is_there(o, (enum wire_instrument)i))
             continue; // has no serial number
         else if (!o->serial[i] || strncmp(o->serial[i], "EMU", 3) != 0)
             return fail(err, ERROR_CONFIG, "serial \"%s\": an emulated one begins with EMU",

@@ -2,7 +2,8 @@
 // The emulated instruments on their wires: spectrometer of the USB2000+'s
 // family, perhaps two (USB), Wii remote infrared camera (HID), WitMotion
 // inclinometer (Modbus RTU on a pty, or TCP), PR-655 spectroradiometer (serial
-// line on a pty), perhaps opentrack (UDP). USB and HID are answered
+// line on a pty), perhaps opentrack (UDP), and the instrument of an emulated
+// spotread, which is a process of its own (spotread_link.h). USB and HID are answered
 // below unmodified libusb and hidapi through umockdev; the process must run
 // under umockdev-wrapper.
 #ifndef SIMULATOR_WIRE_H
@@ -22,7 +23,8 @@
     X(CAMERA, "camera")                                                                            \
     X(RADIOMETER, "radiometer")                                                                    \
     X(SPECTROMETER_2, "spectrometer2")                                                             \
-    X(OPENTRACK, "opentrack")
+    X(OPENTRACK, "opentrack")                                                                      \
+    X(SPOTREAD, "spotread")
 
 enum wire_instrument {
 #define X(name, text) WIRE_##name,
@@ -38,8 +40,11 @@ enum {
     WIRE_ON_HID = 1 << WIRE_CAMERA,
     WIRE_ON_SERIAL = 1 << WIRE_RADIOMETER,
     WIRE_ON_UDP = 1 << WIRE_OPENTRACK,
-    WIRE_ON_DEVICES = WIRE_ON_USB | WIRE_ON_MODBUS | WIRE_ON_HID | WIRE_ON_SERIAL,
-    WIRE_ON_ALL = WIRE_ON_DEVICES | WIRE_ON_UDP,
+    WIRE_ON_PROCESS = 1 << WIRE_SPOTREAD,
+    WIRE_ON_BYTES = WIRE_ON_USB | WIRE_ON_MODBUS | WIRE_ON_HID | WIRE_ON_SERIAL | WIRE_ON_UDP,
+    WIRE_ON_ALL = WIRE_ON_BYTES | WIRE_ON_PROCESS,
+    WIRE_ON_DEVICES = WIRE_ON_ALL & ~WIRE_ON_UDP,
+    WIRE_ON_RADIOMETERS = WIRE_ON_SERIAL | WIRE_ON_PROCESS,
 };
 
 // What can go wrong on a wire; each lasts until WIRE_FINE. See wires.md for
@@ -48,8 +53,8 @@ enum {
     X(FINE, "fine", WIRE_ON_ALL)                                                                   \
     X(UNPLUGGED, "unplugged", WIRE_ON_ALL)                                                         \
     X(SILENT, "silent", WIRE_ON_ALL)   /* replies are dropped */                                   \
-    X(GARBAGE, "garbage", WIRE_ON_ALL) /* bytes are random: no sync, bad CRC, bad status */        \
-    X(SHORT, "short", WIRE_ON_ALL)     /* replies are cut */                                       \
+    X(GARBAGE, "garbage", WIRE_ON_BYTES) /* bytes are random: no sync, bad CRC, bad status */      \
+    X(SHORT, "short", WIRE_ON_BYTES)     /* replies are cut */                                     \
     X(STALL, "stall", WIRE_ON_DEVICES) /* USB stall once, Modbus exception, PR error status */     \
     X(NO_SYNC, "no-sync", WIRE_ON_USB)         /* spectra end before the sync byte */              \
     X(BAD_SYNC, "bad-sync", WIRE_ON_USB)       /* spectra end with another byte */                 \
@@ -73,10 +78,10 @@ enum {
     X(BAD_ADDRESS, "illegal-address", WIRE_ON_MODBUS)                                              \
     X(BAD_VALUE, "illegal-value", WIRE_ON_MODBUS)                                                  \
     X(DEVICE_FAILURE, "device-failure", WIRE_ON_MODBUS)                                            \
-    X(WEAK_LIGHT, "weak-light", WIRE_ON_SERIAL)  /* every M ends with -8 */                        \
-    X(OVERLOAD, "overload", WIRE_ON_SERIAL)      /* every M ends with -2 */                        \
-    X(DRIFT, "drift", WIRE_ON_SERIAL)            /* readings creep upwards */                      \
-    X(MISREAD, "misread", WIRE_ON_SERIAL)        /* a reading now and then is false */             \
+    X(WEAK_LIGHT, "weak-light", WIRE_ON_RADIOMETERS) /* too little light for it */                 \
+    X(OVERLOAD, "overload", WIRE_ON_RADIOMETERS) /* too much */                                    \
+    X(DRIFT, "drift", WIRE_ON_RADIOMETERS)     /* readings creep upwards */                        \
+    X(MISREAD, "misread", WIRE_ON_RADIOMETERS) /* a reading now and then is false */               \
     X(NOT_A_NUMBER, "not-a-number", WIRE_ON_UDP) /* a value is NaN or infinite */                  \
     X(FROZEN, "frozen", WIRE_ON_UDP)             /* the last datagram again and again */           \
     X(WRONG_SIZE, "wrong-size", WIRE_ON_UDP)                                                       \
@@ -125,6 +130,10 @@ bool wire_fault_suits(enum wire_instrument instrument, enum wire_fault fault);
 // when it is enumerated: at once when that takes no time, else by
 // wire_enumerate. Any thread.
 void wire_set_fault(struct wire *wire, enum wire_instrument instrument, enum wire_fault fault);
+
+// What the instrument suffers; UNPLUGGED too while it is not enumerated again.
+// *pulled is how often its plug came out. Any thread.
+enum wire_fault wire_fault_of(struct wire *wire, enum wire_instrument instrument, int *pulled);
 
 // Shows what was plugged in long enough ago. To be called now and then. Any thread.
 void wire_enumerate(struct wire *wire, int64_t now_ns);

@@ -10,6 +10,11 @@ size_t fault_on(enum wire_fault fault, struct noise *noise, uint8_t *bytes, size
     return fault == WIRE_SHORT ? size / 2 : size;
 }
 
+enum lapse_kind lapse_of_fault(enum wire_fault fault)
+{
+    return fault == WIRE_DRIFT ? LAPSE_DRIFT : fault == WIRE_MISREAD ? LAPSE_MISREAD : LAPSE_NONE;
+}
+
 bool wire_fault_suits(enum wire_instrument instrument, enum wire_fault fault)
 {
     static const unsigned wires[] = {

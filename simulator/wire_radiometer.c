@@ -62,9 +62,7 @@ static int64_t serve(void *context, int fd, bool readable, enum wire_fault fault
                           : fault == WIRE_OVERLOAD   ? OVERLOADED
                           : fault == WIRE_WEAK_LIGHT ? TOO_WEAK
                                                      : 0);
-    pr655_lapse(r->model, fault == WIRE_DRIFT     ? LAPSE_DRIFT
-                          : fault == WIRE_MISREAD ? LAPSE_MISREAD
-                                                  : LAPSE_NONE);
+    pr655_lapse(r->model, lapse_of_fault(fault));
     if (readable)
         hear(r, fd);
     char bytes[CHUNK];

@@ -95,7 +95,8 @@ static bool read_event(const struct scenario *s, const char *what, json_t *reque
     if (!strcmp(what, CONTROL_HEAD))
         return get_place(request, "eye_m", &eye, err) && event_head(eye, over, out, err);
     return fail(err, ERROR_CONFIG,
-                "\"%s\" is not one of: lamp, tilt, head, aim, truth, fault, protractor, tape",
+                "\"%s\" is not one of: lamp, tilt, head, aim, radiance, truth, fault, protractor, "
+                "tape",
                 what);
 }
 
@@ -296,12 +297,26 @@ static bool is_tool(const char *what)
     return !strcmp(what, CONTROL_PROTRACTOR) || !strcmp(what, CONTROL_TAPE);
 }
 
+static json_t *answer_radiance(struct world *world, int64_t now_ns)
+{
+    struct around around = world_around(world);
+    struct spectrum light;
+    json_t *values = json_array();
+    around.radiance(around.context, now_ns, &light);
+    for (int i = 0; i < SPECTRUM_COUNT; i++)
+        json_array_append_new(values, json_real(light.v[i]));
+    return json_pack("{s: f, s: {s: i, s: i, s: o}}", "at_s", world_seconds(world, now_ns),
+                     "radiance", "first_nm", SPECTRUM_FIRST_NM, "step_nm", 1, "values", values);
+}
+
 json_t *world_answer(struct world *world, int64_t now_ns, const char *what, json_t *request,
                      struct error *err)
 {
     struct event event;
     if (is_tool(what))
         return answer_tools(world, now_ns, what, request, err);
+    if (!strcmp(what, CONTROL_RADIANCE))
+        return answer_radiance(world, now_ns);
     if (strcmp(what, CONTROL_TRUTH) &&
         (!read_event(world_scenario(world), what, request, &event, err) ||
          !world_add_now(world, now_ns, event, err)))

@@ -10,13 +10,15 @@
 //   fault  instrument, kind
 //   protractor  nothing; the reply is deg alone
 //   tape   x_m, y_m on the screen from its centre; the reply is point_m [x, y, z]
+//   radiance  nothing -> at_s, radiance {first_nm, step_nm, values} of what the radiometer is
+//          aimed at, W m-2 sr-1 nm-1
 //   truth  nothing: what is so now (see below)
 //          reflectance 0..2, or {"nm": [...], "values": [...]}; [name]
 //          samples [{name, reflectance}, ...]
 //          each with [x_px, y_px]: place on the screen; else where the
 //          radiometer is aimed, or the centre when that is the ceiling
 //
-// Every reply holds the state: at_s, lamp ("none", a name, or names joined by
+// Every other reply holds the state: at_s, lamp ("none", a name, or names joined by
 // '+'), level, levels {name: level}, lux (at that place in the screen's plane),
 // tilt_deg, eye_m, aim, illuminant_xyz (cd/m2 of the perfect diffuser there).
 // truth adds, per sample, name, XYZ (cd/m2, CIE 1931 2 degrees) and Y.

@@ -398,6 +398,22 @@ static void a_fault_set_meanwhile_is_there_when_it_shows(void **state)
     hid_close(camera);
 }
 
+static void spotread_s_instrument_tells_what_it_suffers(void **state)
+{
+    (void)state;
+    int before, pulled;
+    assert_int_equal(wire_fault_of(wire, WIRE_SPOTREAD, &before), WIRE_FINE);
+    set_fault(WIRE_SPOTREAD, WIRE_OVERLOAD);
+    assert_int_equal(wire_fault_of(wire, WIRE_SPOTREAD, &pulled), WIRE_OVERLOAD);
+    assert_int_equal(pulled, before);
+    set_fault(WIRE_SPOTREAD, WIRE_UNPLUGGED);
+    set_fault(WIRE_SPOTREAD, WIRE_FINE); // not enumerated yet
+    assert_int_equal(wire_fault_of(wire, WIRE_SPOTREAD, &pulled), WIRE_UNPLUGGED);
+    let_pass(NEVER_S + 1);
+    assert_int_equal(wire_fault_of(wire, WIRE_SPOTREAD, &pulled), WIRE_FINE);
+    assert_int_equal(pulled, before + 1);
+}
+
 static void moving_takes_an_enumeration_too(void **state)
 {
     (void)state;
@@ -435,6 +451,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(plugged_again_they_show_once_enumerated),
         cmocka_unit_test(pulled_again_before_it_is_enumerated_it_does_not_show),
         cmocka_unit_test(a_fault_set_meanwhile_is_there_when_it_shows),
+        cmocka_unit_test(spotread_s_instrument_tells_what_it_suffers),
         cmocka_unit_test(moving_takes_an_enumeration_too),
     };
     return cmocka_run_group_tests(tests, start, stop) +

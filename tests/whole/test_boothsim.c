@@ -91,7 +91,8 @@ static void a_running_booth_leaves_what_the_product_needs(void **state)
     char inside[512];
     snprintf(inside, sizeof inside,
              "--no-xvfb --lamp D50=FL7 --lamp TL84=FL11 -- sh -c 'cd %s/run && test -c inclinometer"
-             " && test -c radiometer && test -s spectrometer.cal && test -S boothsim.sock'",
+             " && test -c radiometer && test -s spectrometer.cal && test -S boothsim.sock"
+             " && test -x spotread'",
              folder);
     assert_int_equal(status_of(booth(inside)), 0);
     static const char *const lamps[] = {"A", "D50", "D65", "TL84"};
@@ -107,6 +108,21 @@ static void a_running_booth_leaves_what_the_product_needs(void **state)
         assert_true(exr_number(&map, "boothd.width_m", &width) && width == 0.90);
         exr_fini(&map);
     }
+}
+
+static void its_spotread_measures_without_a_terminal(void **state)
+{
+    (void)state;
+    char inside[400];
+    snprintf(inside, sizeof inside,
+             "--no-xvfb -- sh -c 'cd %s/run && ./spotread -e -O one.sp log.txt </dev/null && "
+             "test -s one.sp && test -s log.txt'",
+             folder);
+    assert_int_equal(status_of(booth(inside)), 0);
+    assert_true(said(" Result is XYZ: "));
+    snprintf(inside, sizeof inside, "--no-xvfb -- %s/run/spotread -c 2", folder);
+    assert_int_equal(status_of(booth(inside)), 1);
+    assert_true(said("No instrument at port 2"));
 }
 
 // Run in the booth's folder: the second calibration, the port in place of a line, and the ids
@@ -224,6 +240,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_command_runs_on_its_own_screen_and_gives_the_exit_status),
         cmocka_unit_test(a_running_booth_leaves_what_the_product_needs),
+        cmocka_unit_test(its_spotread_measures_without_a_terminal),
         cmocka_unit_test(a_scenario_chooses_the_instruments),
         cmocka_unit_test(bad_input_ends_with_2_and_one_line),
         cmocka_unit_test(help_and_version_are_there),
