@@ -55,7 +55,7 @@ static int status_of(const char *arguments)
 
 static bool said(const char *text)
 {
-    char path[128], words[16384] = "";
+    char path[128], words[32768] = "";
     snprintf(path, sizeof path, "%s/said", folder);
     FILE *file = fopen(path, "r");
     assert_non_null(file);
