@@ -46,6 +46,8 @@ int command_session(int argc, char **argv);
 int command_list(int argc, char **argv);
 int command_spectrometer(int argc, char **argv);
 int command_audit(int argc, char **argv);
+int command_tilt(int argc, char **argv);
+int command_tracker(int argc, char **argv);
 int command_history(int argc, char **argv);
 int command_diff(int argc, char **argv);
 int command_use(int argc, char **argv);

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/clock.h"
+#include "calibration/bench_pose.h"
 #include "calibration/proof.h"
 #include "calibration/session.h"
 #include "config/bands_file.h"

@@ -48,6 +48,9 @@ enum booth_stored {
 // "stand.hinge_m".
 const char *booth_stored_name(enum booth_stored row);
 
+// "stand.hinge_m, tracker.place_m" of a mask of 1 << row; "" of none.
+void booth_stored_list(unsigned rows, char *text, size_t size);
+
 // How long what an instrument said is believed when it says nothing more.
 struct state_settings {
     double lamp_hold_s;      // 0..3600: lamp and level

@@ -92,6 +92,16 @@ const char *booth_stored_name(enum booth_stored row)
     return (unsigned)row < STORED_COUNT ? names[row] : "";
 }
 
+void booth_stored_list(unsigned rows, char *text, size_t size)
+{
+    size_t used = 0;
+    *text = 0;
+    for (unsigned i = 0; i < STORED_COUNT && used < size; i++)
+        if (rows & 1u << i)
+            used += (size_t)snprintf(text + used, size - used, "%s%s", used ? ", " : "",
+                                     booth_stored_name(i));
+}
+
 // The bit of a setting that the store provides, 0 of any other.
 static unsigned stored_bit(const char *section, const char *key)
 {

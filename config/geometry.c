@@ -104,6 +104,15 @@ bool geometry_save(const char *path, const struct geometry *geometry, struct err
     return ini_save(path, layout.sections, err);
 }
 
+void geometry_print(const struct geometry *geometry, FILE *out)
+{
+    struct geometry g = *geometry;
+    struct layout layout;
+    lay_out(&layout, &g, g.rows);
+    for (const struct settings_section *s = layout.sections; s->target == &g.booth; s++)
+        settings_write(s, out);
+}
+
 static size_t size_of(const struct setting *row)
 {
     return row->type == SETTING_VECTOR ? row->size * sizeof(double) : sizeof(double);

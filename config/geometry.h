@@ -31,6 +31,9 @@ struct geometry {
 bool geometry_load(const char *path, struct geometry *out, struct error *err);
 bool geometry_save(const char *path, const struct geometry *geometry, struct error *err);
 
+// Its rows as they stand in boothd.conf.
+void geometry_print(const struct geometry *geometry, FILE *out);
+
 // Copies the rows of a mask from one booth's settings to another's.
 void geometry_take(struct booth_settings *to, const struct booth_settings *from, unsigned rows);
 

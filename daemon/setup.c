@@ -281,17 +281,6 @@ static bool lamp_without_map(const struct setup *s, int index, char *text, size_
     return false;
 }
 
-// "stand.hinge_m, tracker.place_m".
-static void overruled_rows(unsigned rows, char *text, size_t size)
-{
-    size_t used = 0;
-    *text = 0;
-    for (unsigned i = 0; i < STORED_COUNT && used < size; i++)
-        if (rows & 1u << i)
-            used +=
-                snprintf(text + used, size - used, "%s%s", used ? ", " : "", booth_stored_name(i));
-}
-
 static bool calibration_warning(const struct setup *s, int *index, char *text, size_t size)
 {
     const struct booth_calibration *c = &s->calibration;
@@ -311,7 +300,7 @@ static bool calibration_warning(const struct setup *s, int *index, char *text, s
     }
     if (c->overruled && (*index)-- == 0) {
         char rows[160];
-        overruled_rows(c->overruled, rows, sizeof rows);
+        booth_stored_list(c->overruled, rows, sizeof rows);
         snprintf(text, size, "the settings' own count instead of the calibration's: %s", rows);
         return true;
     }
