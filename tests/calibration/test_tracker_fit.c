@@ -104,14 +104,15 @@ static void three_points_by_hand_give_place_and_pitch(void **state)
     (void)state;
     struct tracker_problem p = {POINT_M,
                                 3,
-                                {{{0, 0.8, 0}, {0, 0, 0.5}},
-                                 {{0.2, 0.8, 0}, {0.2, 0, 0.5}},
-                                 {{0, 0.8, -0.1}, {0, 0.1, 0.5}}}};
+                                {{{0, 0.70, 0.50}, {0, 0, 0.5}}, // up by 3, 4 and 5
+                                 {{0.2, 0.70, 0.50}, {0.2, 0, 0.5}},
+                                 {{0, 0.76, 0.42}, {0, 0.1, 0.5}}}};
     struct tracker_fit f = fitted(&p);
     struct vec3 axis = mat3_apply(f.booth_from_tracker.rotation, (struct vec3){0, 0, 1});
     assert_near(f.value[TRACKER_Y], 0.3, EXACT_M);
+    assert_near(f.value[TRACKER_Z], 0.2, EXACT_M);
     assert_near(f.value[TRACKER_X], 0, EXACT_M);
-    assert_near(axis.y, 1, EXACT_M);
+    assert_near(axis.y, 0.8, EXACT_M);
 }
 
 static void the_booth_moved_moves_the_tracker_and_does_not_turn_it(void **state)
