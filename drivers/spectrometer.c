@@ -44,11 +44,14 @@ const struct setting spectrometer_settings[] = {
      .preset = "above dark",
      .help = "What the unit's linearity polynomial is over: as its calibration was made."},
     {"darks", SETTING_TEXT, FIELD(darks), SIZE(darks), .unit = "", .preset = "",
-     .help = "CSV of stored dark spectra: a row a pixel, a column an exposure in us "
-             "(us100000x20: mean of 20); empty: optically black pixels only."},
+     .help =
+         "CSV of stored dark spectra, by boothcal spectrometer dark: a row a pixel, a column an "
+         "exposure in us (us100000x20: mean of 20); empty: optically black pixels only."},
     {"wavelength_nm", SETTING_VECTOR, FIELD(wavelength_nm), .size = 4, .least = -10000,
      .most = 10000, .unit = "nm", .preset = "0 0 0 0",
-     .help = "Wavelength coefficients of a refit over pixel^0..3; zeroes: the unit's own."},
+     .help =
+         "Wavelength coefficients over pixel^0..3, by boothcal spectrometer wavelength; zeroes: "
+         "the unit's own."},
     {"file", SETTING_TEXT, FIELD(file), SIZE(file), .unit = "", .preset = "",
      .help = "Driver replay: file of OceanView, SpectraSuite, Jaz, a .sp or \"nm, value\"."},
     {"file_unit", SETTING_ENUM, FIELD(file_unit), .unit = "", .choices = unit_names,
