@@ -14,14 +14,15 @@ static const double LENGTH = 160;         // CIELAB units over which the residua
 static const double MARGIN = 10;          // CIELAB units of the box around the gamut
 static const double PENALTY_LEAST = 1e-6; // and up by the half decade
 static const double HUBER = 1.5;          // times the median difference: counts by less beyond
-enum { PENALTIES = 19, ROUNDS = 2, SIDE = 9 };
+// TERMS: of the prior; a hundred hold all but a few millionths of its variance.
+enum { PENALTIES = 19, ROUNDS = 2, SIDE = 9, TERMS = 100 };
 
 struct fit {
     const struct measurements *m;
     struct display_model *model;
     struct lattice box;    // its corners
-    double *prior;         // LATTICE_NODES squared: factor of the prior covariance
-    double *design;        // patches x LATTICE_NODES, on the prior's factor
+    double *prior;         // LATTICE_NODES x TERMS: factor of the prior covariance
+    double *design;        // patches x TERMS, on the prior's factor
     double (*apart)[3];    // measured less predicted, CIELAB
     struct lab *measured;  // CIELAB
     struct lab *predicted; // CIELAB
@@ -45,8 +46,8 @@ static void drop(struct fit *f)
 static bool take_room(struct fit *f, struct error *err)
 {
     size_t n = (size_t)f->m->count;
-    f->prior = malloc(sizeof(double) * LATTICE_NODES * LATTICE_NODES);
-    f->design = malloc(n * LATTICE_NODES * sizeof *f->design);
+    f->prior = malloc(sizeof(double) * LATTICE_NODES * TERMS);
+    f->design = malloc(n * TERMS * sizeof *f->design);
     f->apart = malloc(n * sizeof *f->apart);
     f->measured = malloc(n * sizeof *f->measured);
     f->predicted = malloc(n * sizeof *f->predicted);
@@ -99,27 +100,30 @@ static struct vec3 node_place(const struct lattice *box, int node)
 
 static bool find_prior(struct fit *f, struct error *err)
 {
-    const double jitter = 1e-9; // of the variance: keeps the factor regular
+    const double tolerance = 1e-9; // of the variance
+    double *covariance = malloc(sizeof(double) * LATTICE_NODES * LATTICE_NODES);
+    if (!covariance)
+        return fail(err, ERROR_SYSTEM, "out of memory for a residual");
     for (int i = 0; i < LATTICE_NODES; i++)
-        for (int j = 0; j <= i; j++) {
-            struct vec3 apart = vec3_sub(node_place(&f->box, i), node_place(&f->box, j));
-            f->prior[i * LATTICE_NODES + j] = matern(vec3_length(apart)) + (i == j ? jitter : 0);
-        }
-    return cholesky(f->prior, LATTICE_NODES) ||
-           fail(err, ERROR_DATA, "residual: no gamut to lay it over");
+        for (int j = 0; j < LATTICE_NODES; j++)
+            covariance[i * LATTICE_NODES + j] =
+                matern(vec3_length(vec3_sub(node_place(&f->box, i), node_place(&f->box, j))));
+    cholesky_pivoted(covariance, LATTICE_NODES, TERMS, tolerance, f->prior);
+    free(covariance);
+    return true;
 }
 
 static void design_row(const struct fit *f, struct lab at, double *row)
 {
     struct lattice_place p = lattice_find(&f->box, (struct vec3){at.L, at.a, at.b});
-    memset(row, 0, LATTICE_NODES * sizeof *row);
+    memset(row, 0, TERMS * sizeof *row);
     for (int i = 0; i < 4; i++)
         for (int j = 0; j < 4; j++)
             for (int k = 0; k < 4; k++) {
                 int node = lattice_node(p.first[0] + i, p.first[1] + j, p.first[2] + k);
                 double w = p.weight[0][i] * p.weight[1][j] * p.weight[2][k];
-                for (int n = 0; n <= node; n++)
-                    row[n] += w * f->prior[node * LATTICE_NODES + n];
+                for (int n = 0; n < TERMS; n++)
+                    row[n] += w * f->prior[node * TERMS + n];
             }
 }
 
@@ -142,7 +146,7 @@ static void find_rows(struct fit *f)
         f->apart[i][1] = is.a - was.a;
         f->apart[i][2] = is.b - was.b;
         f->weight[i] = scale * scale;
-        design_row(f, was, f->design + (long)i * LATTICE_NODES);
+        design_row(f, was, f->design + (long)i * TERMS);
     }
 }
 
@@ -193,7 +197,7 @@ static void reweight(struct fit *f)
 static struct ridge *decompose(const struct fit *f, struct error *err)
 {
     const struct ridge_problem problem = {.rows = f->m->count,
-                                          .unknowns = LATTICE_NODES,
+                                          .unknowns = TERMS,
                                           .values = 3,
                                           .design = f->design,
                                           .value = f->apart[0],
@@ -204,14 +208,14 @@ static struct ridge *decompose(const struct fit *f, struct error *err)
 static void lay(const struct fit *f, const struct ridge *ridge, double penalty,
                 struct display_model *model)
 {
-    double c[LATTICE_NODES][3];
+    double c[TERMS][3];
     ridge_solve(ridge, penalty, c[0]);
     model->kind = DISPLAY_RESIDUAL;
     model->residual = f->box;
     for (int k = 0; k < LATTICE_NODES; k++)
-        for (int j = 0; j <= k; j++)
+        for (int j = 0; j < TERMS; j++)
             for (int n = 0; n < 3; n++)
-                model->residual.node[k][n] += f->prior[k * LATTICE_NODES + j] * c[j][n];
+                model->residual.node[k][n] += f->prior[k * TERMS + j] * c[j][n];
 }
 
 static bool settle(const struct fit *f, const struct ridge *ridge, int from,

@@ -17,7 +17,7 @@
 
 struct residual_fit {
     double penalty; // noise variance (dE00^2) over prior variance (CIELAB^2)
-    double freedom; // coefficients that the patches decide, of LATTICE_NODES
+    double freedom; // terms that the patches decide
 };
 
 // Makes a prepared DAY model a prepared RESIDUAL one. Where the residual that

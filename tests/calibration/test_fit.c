@@ -4,6 +4,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "calibration/cholesky.h"
@@ -273,6 +274,35 @@ static void a_textbook_matrix_has_its_textbook_factor(void **state)
     assert_false(cholesky(none, 1));
 }
 
+static void pivoted_columns_come_nearer_until_nothing_is_left(void **state)
+{
+    (void)state;
+    enum { N = 12 };
+    double a[N][N], factor[N * N], last = INFINITY;
+    for (int i = 0; i < N; i++)
+        for (int j = 0; j < N; j++)
+            a[i][j] = exp(-0.3 * abs(i - j)) + 1e-3 * (i == j);
+    for (int rank = 1; rank <= N; rank++) {
+        double off = 0;
+        assert_int_equal(cholesky_pivoted(a[0], N, rank, 1e-12, factor), rank);
+        for (int i = 0; i < N; i++)
+            for (int j = 0; j < N; j++) {
+                double sum = 0;
+                for (int k = 0; k < rank; k++)
+                    sum += factor[i * rank + k] * factor[j * rank + k];
+                off = fmax(off, fabs(sum - a[i][j]));
+            }
+        assert_true(off < last);
+        last = off;
+    }
+    assert_near(last, 0, 1e-12);
+    const double one[4] = {1, 2, 2, 4}; // of rank 1
+    assert_int_equal(cholesky_pivoted(one, 2, 2, 1e-9, factor), 1);
+    assert_near(factor[2], 2, 1e-12);
+    assert_near(factor[0], 1, 1e-12);
+    assert_near(factor[1], 0, 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -284,6 +314,7 @@ int main(void)
         cmocka_unit_test(the_certified_line_through_norris_is_found),
         cmocka_unit_test(rows_left_out_in_closed_form_are_rows_left_out),
         cmocka_unit_test(a_textbook_matrix_has_its_textbook_factor),
+        cmocka_unit_test(pivoted_columns_come_nearer_until_nothing_is_left),
         cmocka_unit_test(failures_leave_the_start_alone_and_say_why),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
