@@ -251,7 +251,8 @@ static bool take_model(const char *text, struct options *o)
         }
     if (o->only || !strcmp(text, "auto"))
         return true;
-    command_bad_usage("--model %s: none of auto, day, interaction, residual", text);
+    command_bad_usage("boothcal display fit: --model %s: none of auto, day, interaction, residual",
+                      text);
     return false;
 }
 
