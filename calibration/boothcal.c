@@ -23,6 +23,8 @@ static const struct command FAMILIES[] = {
      "hinge, screen and inclinometer from poses of the stand"},
     {"tracker", command_tracker, "--config FILE [--points FILE.csv] [OPTION]...",
      "place of the head tracker from its marker held before the screen"},
+    {"keep", command_keep, "--config FILE [--display D.ini] [--lamp NAME.ini] [OPTION]...",
+     "makes single results a new version of the store of calibrations"},
     {"history", command_history, "--config FILE [--verify] [--json]",
      "the calibrations of a booth and its display in the store"},
     {"diff", command_diff, "--config FILE A [B] [--json]",

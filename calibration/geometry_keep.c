@@ -7,6 +7,7 @@
 
 #include "base/clock.h"
 #include "calibration/commands.h"
+#include "calibration/store_keep.h"
 #include "config/booth_store.h"
 #include "config/paths.h"
 
@@ -75,20 +76,6 @@ bool geometry_keep_in_file(const char *path, const struct geometry *found, bool 
     return geometry_save(path, &all, err);
 }
 
-static struct store_manifest facts_of(const struct booth_settings *booth,
-                                      const struct store_draft *d, const char *note)
-{
-    struct store_manifest m = {.version = 0};
-    clock_utc(m.created);
-    snprintf(m.software, sizeof m.software, "boothcal %s", BOOTHD_VERSION);
-    snprintf(m.note, sizeof m.note, "%s", note);
-    if (d->base.version)
-        memcpy(m.valid_until, d->base.valid_until, sizeof m.valid_until);
-    else
-        booth_valid_until(booth, clock_utc_s(), m.valid_until);
-    return m;
-}
-
 bool geometry_keep_in_store(const struct booth_settings *booth, const struct geometry *found,
                             bool stand, const char *note, int *number, struct error *err)
 {
@@ -97,7 +84,7 @@ bool geometry_keep_in_store(const struct booth_settings *booth, const struct geo
     char path[PATH_MAX];
     if (!booth_store_place(booth, &place, err) || !store_begin(&place, true, &d, err))
         return false;
-    struct store_manifest facts = facts_of(booth, &d, note);
+    struct store_manifest facts = store_facts(booth, &d, false, note);
     snprintf(path, sizeof path, "%s/" STORE_GEOMETRY, d.folder);
     if (geometry_keep_in_file(path, found, stand, err) && store_commit(&d, &facts, number, err))
         return true;

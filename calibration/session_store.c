@@ -4,10 +4,9 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "base/clock.h"
 #include "calibration/session.h"
+#include "calibration/store_keep.h"
 #include "config/booth_store.h"
-#include "config/lamps.h"
 
 bool session_store_begin(struct session *s, struct error *err)
 {
@@ -26,23 +25,6 @@ bool session_store_begin(struct session *s, struct error *err)
     if (!(b->given & 1u << STORED_MODEL))
         snprintf(b->display.model, sizeof b->display.model, "%s/" STORE_DISPLAY, s->out);
     return true;
-}
-
-// With its map, so that the version stands alone.
-static bool put_lamp(struct store_draft *d, const char *folder, const char *name, struct error *err)
-{
-    struct lamp lamp;
-    char path[PATH_MAX], inside[128];
-    snprintf(path, sizeof path, "%s/%s.ini", folder, name);
-    if (!lamp_load(path, &lamp, err))
-        return false;
-    snprintf(inside, sizeof inside, STORE_LAMPS "/%s.exr", name);
-    if (*lamp.file.map && !store_put(d, lamp.file.map, inside, err))
-        return false;
-    if (*lamp.file.map)
-        snprintf(lamp.file.map, sizeof lamp.file.map, "%s.exr", name);
-    snprintf(path, sizeof path, "%s/" STORE_LAMPS, d->folder);
-    return lamp_save(path, &lamp, err);
 }
 
 static bool put_beside(struct store_draft *d, const char *folder, const char *name,
@@ -71,9 +53,12 @@ static bool put_all(struct session *s, enum session_stage stage, struct store_dr
                     struct error *err)
 {
     const struct booth_settings *b = &s->settings;
-    for (int i = 0; i < s->facts->lamp_count; i++)
-        if (!put_lamp(d, b->lamps.folder, s->facts->lamps[i].name, err))
+    for (int i = 0; i < s->facts->lamp_count; i++) {
+        char path[PATH_MAX];
+        snprintf(path, sizeof path, "%s/%s.ini", b->lamps.folder, s->facts->lamps[i].name);
+        if (!store_keep_lamp(d, path, err))
             return false;
+    }
     if (stage >= STAGE_CHARACTERISED && (!store_put(d, b->display.model, STORE_DISPLAY, err) ||
                                          !put_beside(d, s->out, STORE_MEASUREMENTS, err) ||
                                          !put_beside(d, s->out, STORE_VERIFICATION, err)))
@@ -96,20 +81,6 @@ static const char *note_of(enum session_stage stage)
     return "";
 }
 
-static struct store_manifest facts_of(const struct session *s, enum session_stage stage,
-                                      const struct store_draft *d)
-{
-    struct store_manifest m = {.version = 0};
-    clock_utc(m.created);
-    snprintf(m.software, sizeof m.software, "boothcal %s", BOOTHD_VERSION);
-    snprintf(m.note, sizeof m.note, "%s%s", note_of(stage), s->rehearse ? " (rehearsed)" : "");
-    if (stage == STAGE_TAUGHT && d->base.version)
-        memcpy(m.valid_until, d->base.valid_until, sizeof m.valid_until);
-    else
-        booth_valid_until(&s->settings, clock_utc_s(), m.valid_until);
-    return m;
-}
-
 bool session_store(struct session *s, enum session_stage stage, struct error *err)
 {
     struct store_draft d;
@@ -117,7 +88,9 @@ bool session_store(struct session *s, enum session_stage stage, struct error *er
         return true;
     if (!store_begin(&s->store, true, &d, err))
         return false;
-    struct store_manifest facts = facts_of(s, stage, &d);
+    char note[128];
+    snprintf(note, sizeof note, "%s%s", note_of(stage), s->rehearse ? " (rehearsed)" : "");
+    struct store_manifest facts = store_facts(&s->settings, &d, stage > STAGE_TAUGHT, note);
     if (put_all(s, stage, &d, err) && store_commit(&d, &facts, NULL, err))
         return true;
     store_abandon(&d);

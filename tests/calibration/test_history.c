@@ -305,6 +305,58 @@ static void an_expired_calibration_is_used_with_a_warning(void **state)
     assert_holds(last.said, "  expired     ");
 }
 
+static void single_results_are_kept_beside_the_rest(void **state)
+{
+    (void)state;
+    struct store_version v;
+    struct store_manifest before;
+    char words[1024];
+    assert_true(store_manifest(&place, 2, &before, NULL));
+    snprintf(words, sizeof words, "--geometry %s --file %s --note tilted",
+             folder_put(&here, "g.ini", "[stand]\nhinge_m = 0 0.5 0\n"),
+             folder_put(&here, "view.ini", "[view]\n"));
+    assert_int_equal(run(command_keep, "keep", words), COMMAND_FINE);
+    assert_holds(last.said, "calibration 0003 is in force: tilted");
+    assert_true(store_open(&place, 3, &v, NULL));
+    assert_non_null(store_sum(&v, "view.ini"));
+    assert_non_null(store_sum(&v, "lamps/day.exr")); // of the one before
+    assert_string_equal(v.manifest.valid_until, before.valid_until);
+    store_version_fini(&v);
+    // A lamp and a model from elsewhere, here from an older version.
+    snprintf(words, sizeof words,
+             "--display %.400s/0001/display.ini --lamp %.400s/0001/lamps/day.ini", place.folder,
+             place.folder);
+    assert_int_equal(run(command_keep, "keep", words), COMMAND_FINE);
+    struct difference d = difference(1, 4);
+    assert_near(d.display.de00.max, 0, 0);
+    assert_int_equal(d.lamp_count, 0);
+    difference_fini(&d);
+    assert_true(store_manifest(&place, 4, &before, NULL));
+    struct store_manifest now = before;
+    double days = (store_age_days(&now, clock_utc_s()));
+    assert_true(days >= 0 && days < 1 && !store_expired(&now, clock_utc_s() + 29 * 86400));
+}
+
+static void what_boothd_would_refuse_is_not_kept(void **state)
+{
+    (void)state;
+    char words[512];
+    int number;
+    folder_put(&here, "bad.ini", "[lamp]\nname = x\n");
+    static const char *const OPTIONS[] = {"--display", "--lamp", "--geometry"};
+    for (int i = 0; i < 3; i++) {
+        snprintf(words, sizeof words, "%s %s", OPTIONS[i], folder_at(&here, "bad.ini"));
+        assert_int_equal(run(command_keep, "keep", words), COMMAND_USAGE);
+        assert_holds(last.complained, "bad.ini");
+    }
+    snprintf(words, sizeof words, "--file %s", folder_at(&here, "none"));
+    assert_int_equal(run(command_keep, "keep", words), COMMAND_USAGE);
+    assert_int_equal(run(command_keep, "keep", ""), COMMAND_USAGE);
+    assert_holds(last.complained, "something to keep");
+    assert_true(store_current(&place, &number, NULL));
+    assert_int_equal(number, 2);
+}
+
 static void wrong_words_are_refused(void **state)
 {
     (void)state;
@@ -343,6 +395,8 @@ int main(void)
         TEST(history_lists_and_marks_and_warns),
         TEST(diff_says_it_and_use_puts_in_force),
         TEST(an_expired_calibration_is_used_with_a_warning),
+        TEST(single_results_are_kept_beside_the_rest),
+        TEST(what_boothd_would_refuse_is_not_kept),
         TEST(wrong_words_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
