@@ -16,9 +16,9 @@ boothsim_in := simulator
 
 PACKAGES := git make gcc g++ libc6-dev pkg-config libusb-1.0-0-dev libudev-dev libmodbus-dev libhidapi-dev libiio-dev \
   libopencv-core-dev libopencv-calib3d-dev libceres-dev libopenexr-dev libglfw3-dev libepoxy-dev \
-  libegl-dev libgl1-mesa-dri libinih-dev libjansson-dev libpng-dev libssl-dev libmatio-dev libsystemd-dev \
+  libegl-dev libgl1-mesa-dri libinih-dev libjansson-dev libpng-dev libssl-dev liblcms2-dev libmatio-dev libsystemd-dev \
   libcmocka-dev libumockdev-dev umockdev xvfb xauth systemd psychtoolbox-3-common clang-format
-PKGS := libusb-1.0 libudev libmodbus hidapi-hidraw libiio OpenEXR glfw3 epoxy egl inih jansson libpng libcrypto matio \
+PKGS := libusb-1.0 libudev libmodbus hidapi-hidraw libiio OpenEXR glfw3 epoxy egl inih jansson libpng libcrypto lcms2 matio \
   libsystemd cmocka umockdev-1.0
 
 OPTIMISE := -O2
@@ -39,7 +39,7 @@ simulator_libs   := $(shell pkg-config --libs umockdev-1.0 2>/dev/null) -lmodbus
 simulator_test_libs := -lusb-1.0 -lhidapi-hidraw
 render_libs      := -lglfw -lepoxy -lEGL -lm
 config_libs      := -lm
-calibration_libs := -lceres -lglog -lmatio -lstdc++ -lm
+calibration_libs := -llcms2 -lceres -lglog -lmatio -lstdc++ -lm
 daemon_libs      := -lsystemd -lpthread -lm
 
 # One short line a step; V=1 shows the whole commands.

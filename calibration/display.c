@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "calibration/commands.h"
+#include "calibration/display_export.h"
 #include "calibration/display_fit.h"
 #include "calibration/display_fitting.h"
 #include "calibration/display_measure.h"
@@ -261,6 +262,16 @@ int command_display(int argc, char **argv)
          "\n"
          "  D.ini      model, as display fit writes it\n"
          "  --help"},
+        {"export", display_exporting, "D.ini [--icc OUT.icc] [--cube OUT.cube] [--size N]",
+         "Writes a model for other software.\n"
+         "\n"
+         "  D.ini            model, as display fit writes it\n"
+         "  --icc OUT.icc    an ICC v4 display profile, relative to the display's white\n"
+         "  --cube OUT.cube  a 3D LUT from sRGB (white D65, not adapted) to the display's counts\n"
+         "  --size N         nodes a side of the LUT, 2..129 (33)\n"
+         "  --help\n"
+         "\n"
+         "Exit 3: done, but the display does not reach D65 at its white's luminance."},
         {NULL, NULL, NULL, NULL},
     };
     return command_run("boothcal display", TABLE, argc, argv);
