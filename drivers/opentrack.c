@@ -37,6 +37,9 @@ static double little_endian(const uint8_t bytes[8])
     return value;
 }
 
+// Rounding leaves more than this or nothing; random bytes are mostly below it.
+static const double LEAST = 1e-20;
+
 bool opentrack_decode(const uint8_t *bytes, size_t count, double pose[OPENTRACK_AXES],
                       struct error *err)
 {
@@ -50,6 +53,8 @@ bool opentrack_decode(const uint8_t *bytes, size_t count, double pose[OPENTRACK_
         if (!(fabs(read[i]) <= most))
             return fail(err, ERROR_DATA, "%s is %g, not within +-%d %s", names[i], read[i], most,
                         i < 3 ? "cm" : "deg");
+        if (read[i] != 0 && fabs(read[i]) < LEAST)
+            return fail(err, ERROR_DATA, "%s is %g: no pose but random bytes", names[i], read[i]);
     }
     memcpy(pose, read, sizeof read);
     return true;

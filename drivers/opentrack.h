@@ -14,7 +14,7 @@ extern const struct tracker_driver opentrack_driver;
 enum { OPENTRACK_AXES = 6, OPENTRACK_BYTES = 48 };
 
 // x, y, z in cm, yaw, pitch, roll in degrees from one datagram. DATA unless it
-// has exactly 48 bytes, all of them finite and in range.
+// has exactly 48 bytes, all values finite, in range, and 0 or at least 1e-20.
 bool opentrack_decode(const uint8_t *bytes, size_t count, double pose[OPENTRACK_AXES],
                       struct error *err);
 

@@ -52,6 +52,32 @@ static void the_published_datagram_decodes(void **state)
         assert_near(pose[i], wanted[i], arithmetic);
 }
 
+// Half of all random doubles are within 500, so one in 64 of such poses.
+static void random_bytes_are_no_pose(void **state)
+{
+    (void)state;
+    uint64_t seed = 1;
+    int taken = 0;
+    for (int i = 0; i < 100000; i++) {
+        uint8_t bytes[48];
+        double pose[6];
+        for (int k = 0; k < 48; k++)
+            bytes[k] = (uint8_t)((seed = seed * 6364136223846793005u + 1442695040888963407u) >> 56);
+        taken += opentrack_decode(bytes, sizeof bytes, pose, NULL);
+    }
+    assert_int_equal(taken, 0);
+}
+
+static void the_residue_of_rounding_is_a_pose(void **state)
+{
+    (void)state;
+    const double residue[6] = {0, -0.0, 60, 1e-15, -3e-17, 0};
+    uint8_t bytes[48];
+    double pose[6];
+    pack(residue, bytes);
+    assert_true(opentrack_decode(bytes, sizeof bytes, pose, NULL));
+}
+
 static void another_length_is_refused(void **state)
 {
     (void)state;
@@ -66,7 +92,7 @@ static void another_length_is_refused(void **state)
 static void what_is_no_number_or_out_of_range_is_refused(void **state)
 {
     (void)state;
-    const double bad[] = {NAN, INFINITY, -INFINITY, 1e300, 501, -501};
+    const double bad[] = {NAN, INFINITY, -INFINITY, 1e300, 501, -501, 1e-58, -5e-324};
     for (int axis = 0; axis < 6; axis++)
         for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
             double pose[6] = {0}, out[6];
@@ -257,6 +283,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_published_datagram_decodes),
         cmocka_unit_test(another_length_is_refused),
+        cmocka_unit_test(random_bytes_are_no_pose),
+        cmocka_unit_test(the_residue_of_rounding_is_a_pose),
         cmocka_unit_test(what_is_no_number_or_out_of_range_is_refused),
         cmocka_unit_test(a_head_at_rest_is_where_it_says),
         cmocka_unit_test(turns_carry_the_eye_left_up_and_over),
