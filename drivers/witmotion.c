@@ -123,6 +123,8 @@ static bool check_reply(const struct accelerometer *a, const uint8_t *reply, int
                         struct error *err)
 {
     const char *port = a->options.port;
+    if (count < 2) // libmodbus passes over a frame to somebody else
+        return fail(err, ERROR_RETRY, "%s: an answer, but not of unit %d", port, a->options.unit);
     if (count < 3)
         return fail(err, ERROR_RETRY, "%s: reply of %d bytes", port, count);
     if (reply[0] != a->options.unit)
