@@ -176,4 +176,19 @@ static inline struct held held_by(pid_t pid)
                          (double)pages * (double)sysconf(_SC_PAGESIZE) / (1 << 20)};
 }
 
+// The same once threads and descriptors have not changed for half a second.
+static inline struct held held_at_rest(pid_t pid)
+{
+    enum { SAME_LOOKS = 20 };
+    struct held last = held_by(pid);
+    for (int same = 0; same < SAME_LOOKS;) {
+        clock_sleep_until_ns(clock_now_ns() + 25 * NS_PER_MS);
+        struct held now = held_by(pid);
+        bool alike = now.threads == last.threads && now.descriptors == last.descriptors;
+        same = alike ? same + 1 : 0;
+        last = now;
+    }
+    return last;
+}
+
 #endif

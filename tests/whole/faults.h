@@ -35,10 +35,12 @@ struct row {
     const char *on;    // another instrument of boothsim that fails
     // Of full, that the lamp is dimmed to before the fault and once it is there; 0 = it is not.
     double light_before, light;
-    int lasts_s; // once it shows; 0 = no longer than is needed to see it
-    bool alone;  // no other row while this one is run
+    int lasts_s;  // once it shows; 0 = no longer than is needed to see it
+    int stops_ms; // boothd itself is stopped for so long
+    bool alone;   // no other row while this one is run
     // Found out:
     char finding[512]; // what was wrong; "" = nothing
+    char said[512];    // the instrument's error meanwhile
     double back_ms, allowed_ms;
     bool run;
 };
@@ -52,7 +54,7 @@ struct kind {
     const char *instrument; // boothsim's word
     const char *name;       // boothd's word
     const char *runs;       // how the log says that it is there
-    double opens_ms;        // until the first sample, on a machine that has nothing else to do
+    double enumerates_ms;   // boothsim's preset, after it was away
     struct row *rows;
     int count;
     // Any may be NULL: then boothsim is asked, value[0] > 0 is believed, the row is polled.
@@ -61,7 +63,6 @@ struct kind {
     bool (*is_true)(const struct lane *lane, const double value[3]);
     void (*run)(struct lane *lane, struct row *row);
     bool (*come_up)(struct lane *lane); // what is to be done before its first row
-    void (*go_down)(struct lane *lane);
 };
 
 extern const struct kind spectrometer_kind, second_spectrometer_kind, inclinometer_kind, tcp_kind,
@@ -76,7 +77,6 @@ struct lane {
     double period_ms; // from sample to sample then
     struct row *row;  // being run, NULL = none
     pthread_t thread;
-    void *own; // the kind's
 };
 
 // What is looked at in a status.
@@ -115,9 +115,12 @@ bool measures(struct lane *lane, int timeout_s, double *luminance, struct error 
 // Runs the row of a polled instrument.
 void run_polled(struct lane *lane, struct row *row);
 
-// Whether it came back in time: 2 s, its opening, three samples of period_ms, and what the
-// machine did meanwhile (pace.h). Fills what the row found out about it.
+// Whether it came back in time: 2 s, its enumeration, three samples of period_ms, and what the
+// machine did meanwhile (faults_pace.h). Fills what the row found out about it.
 void judge_recovery(struct lane *lane, struct row *row, int64_t fine_ns, int64_t back_ns);
+
+// How long a thread may outlast its deadline on this machine between these instants, in ms.
+double lateness_allowed_ms(int64_t from_ns, int64_t to_ns);
 
 // A UDP port of 127.0.0.1 that nobody has.
 int opentrack_free_port(void);

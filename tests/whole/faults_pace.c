@@ -64,12 +64,14 @@ void pace_stop(void)
     pace.stop = true;
     pthread_mutex_unlock(&pace.lock);
     pthread_join(pace.thread, NULL);
+    control_close(pace.daemon);
 }
 
 double pace_exchange_ms(int64_t from_ns, int64_t to_ns)
 {
     int64_t late_ns = 0, now_ns = clock_now_ns();
     int looks = 0;
+    from_ns = from_ns < to_ns - NS_PER_S ? from_ns : to_ns - NS_PER_S;
     pthread_mutex_lock(&pace.lock);
     for (int i = pace.count > KEPT ? pace.count - KEPT : 0; i < pace.count; i++) {
         int64_t begun_ns = pace.begun_ns[i % KEPT], ended_ns = pace.ended_ns[i % KEPT];

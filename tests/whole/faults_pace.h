@@ -15,7 +15,8 @@ bool pace_start(struct control_client *daemon);
 void pace_stop(void);
 
 // What one exchange with another program took on average between these
-// instants (CLOCK_MONOTONIC), in ms: waking up when it was time, and an answer.
+// instants (CLOCK_MONOTONIC), or in the second before the later one, in ms:
+// waking up when it was time, and an answer.
 double pace_exchange_ms(int64_t from_ns, int64_t to_ns);
 
 #endif

@@ -14,12 +14,12 @@ static const double MUTE_MS = 900;  // far above any instrument's cycle under th
 static const double GROWS_MS = 100; // by so much, between two looks
 static const int64_t PAUSE_NS = 150 * NS_PER_MS;
 
-// Recovery: the longest rest between two tries, the opening of the instrument, three samples.
-static const double REST_MS = 2000;
+// Recovery: to notice it, to open it and to find its exposure; three samples; and, when it was
+// away, its own enumeration.
+static const double NOTICED_MS = 2000;
 // Opening a spectrometer and finding its exposure are some 60 transfers, each of
-// some five steps between programs and threads that wake each other. On an idle
-// machine they are part of opens_ms; on a busy one each takes what an exchange
-// with boothd takes.
+// some five steps between programs and threads that wake each other; on a busy
+// machine each step takes what an exchange with boothd takes.
 enum { EXCHANGES = 300 };
 // A driver's waits end by its deadline; this is for what it does then.
 static const double OVERDUE_MS = 50;
@@ -188,19 +188,25 @@ static bool lines_are_due(enum effect effect, int lines)
 
 void judge_recovery(struct lane *lane, struct row *row, int64_t fine_ns, int64_t back_ns)
 {
+    bool was_away = (row->effect == GOES || row->effect == BLINKS) && !row->first;
     double busy_ms = EXCHANGES * pace_exchange_ms(fine_ns, back_ns);
     row->back_ms = (double)(back_ns - fine_ns) / NS_PER_MS;
-    row->allowed_ms = REST_MS + lane->kind->opens_ms + SAMPLES_AFTER * lane->period_ms + busy_ms;
+    row->allowed_ms = NOTICED_MS + (was_away ? lane->kind->enumerates_ms : 0) +
+                      SAMPLES_AFTER * lane->period_ms + busy_ms;
     if (row->back_ms > row->allowed_ms)
         found(row, "back after %.0f ms instead of %.0f, of which %.0f because the machine is busy",
               row->back_ms, row->allowed_ms, busy_ms);
 }
 
-static void judge_deadlines(struct row *row, const struct look *before, const struct look *after,
-                            int64_t begun_ns)
+double lateness_allowed_ms(int64_t from_ns, int64_t to_ns)
 {
-    double most_ms = OVERDUE_MS + EXCHANGES * pace_exchange_ms(begun_ns, after->answered_ns);
-    if (after->overdue_ms > before->overdue_ms && after->overdue_ms > most_ms)
+    return OVERDUE_MS + EXCHANGES * pace_exchange_ms(from_ns, to_ns);
+}
+
+static void judge_deadlines(struct row *row, const struct look *before, const struct look *after)
+{
+    double allowed_ms = lateness_allowed_ms(before->answered_ns, after->answered_ns);
+    if (after->overdue_ms > before->overdue_ms && after->overdue_ms > allowed_ms + row->stops_ms)
         found(row, "its driver outlasted a deadline by %.0f ms", after->overdue_ms);
 }
 
@@ -241,13 +247,14 @@ void run_polled(struct lane *lane, struct row *row)
         return;
     suffer(lane, row, &before, from);
     look_at(lane, row, &ill);
+    snprintf(row->said, sizeof row->said, "%s", ill.error);
     if (!end(lane, row))
         return;
     int64_t fine_ns = clock_now_ns();
     if (!await(lane, row, is_back, "back", &ill, &after))
         return;
     judge_recovery(lane, row, fine_ns, after.answered_ns - (int64_t)(after.age_ms * NS_PER_MS));
-    judge_deadlines(row, &before, &after, before.answered_ns);
+    judge_deadlines(row, &before, &after);
     int lines = changes_logged(lane, row, from);
     if (!lines_are_due(row->effect, lines))
         found(row, "%d lines were logged of its changes", lines);

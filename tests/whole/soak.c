@@ -141,7 +141,7 @@ static void nothing_grows_while_instruments_run_and_fail(void **state)
     show(1);
     measure(true);
     suffer(0); // each kind of fault once would take as long as the soak itself
-    struct held before = held_by(here.daemon);
+    struct held before = held_at_rest(here.daemon);
     double spectra = samples_of("spectrometer"), tilts = samples_of("accelerometer");
     double heads = samples_of("tracker");
     int64_t start_ns = clock_now_ns();
