@@ -15,7 +15,7 @@ boothcal_in := calibration
 boothsim_in := simulator
 
 PACKAGES := git make gcc g++ libc6-dev pkg-config libusb-1.0-0-dev libudev-dev libmodbus-dev libhidapi-dev libiio-dev \
-  libopencv-core-dev libopencv-calib3d-dev libceres-dev libopenexr-dev libglfw3-dev libepoxy-dev \
+  libopencv-core-dev libopencv-calib3d-dev libopencv-imgproc-dev libopencv-photo-dev libceres-dev libopenexr-dev libglfw3-dev libepoxy-dev \
   libegl-dev libgl1-mesa-dri libinih-dev libjansson-dev libpng-dev libssl-dev liblcms2-dev libmatio-dev libsystemd-dev \
   libcmocka-dev libumockdev-dev umockdev xvfb xauth systemd psychtoolbox-3-common clang-format
 PKGS := libusb-1.0 libudev libmodbus hidapi-hidraw libiio OpenEXR glfw3 epoxy egl inih jansson libpng libcrypto lcms2 matio \
@@ -39,7 +39,7 @@ simulator_libs   := $(shell pkg-config --libs umockdev-1.0 2>/dev/null) -lmodbus
 simulator_test_libs := -lusb-1.0 -lhidapi-hidraw
 render_libs      := -lglfw -lepoxy -lEGL -lm
 config_libs      := -lm
-calibration_libs := -llcms2 -lceres -lglog -lmatio -lstdc++ -lm
+calibration_libs := -llcms2 -lopencv_photo -lopencv_imgproc -lopencv_calib3d -lopencv_core -lceres -lglog -lmatio -lstdc++ -lm
 daemon_libs      := -lsystemd -lpthread -lm
 
 # One short line a step; V=1 shows the whole commands.
@@ -68,7 +68,7 @@ deps:
 $(BUILD)/packages.ok: Makefile
 	@mkdir -p $(@D)
 	@for p in $(PKGS); do pkg-config --exists $$p || { echo "boothd: the library $$p is missing; run 'make deps' (as root) first" >&2; exit 1; }; done
-	@for h in opencv4/opencv2/calib3d.hpp ceres/ceres.h; do [ -e /usr/include/$$h ] || { echo "boothd: <$$h> is missing; run 'make deps' (as root) first" >&2; exit 1; }; done
+	@for h in opencv4/opencv2/calib3d.hpp opencv4/opencv2/photo.hpp opencv4/opencv2/imgproc.hpp ceres/ceres.h; do [ -e /usr/include/$$h ] || { echo "boothd: <$$h> is missing; run 'make deps' (as root) first" >&2; exit 1; }; done
 	@touch $@
 
 $(BUILD)/%.o: %.c | $(BUILD)/packages.ok

@@ -14,6 +14,7 @@ bool light_picture(const char *path, const struct luminance_map *map,
 
 // The subcommands; argv[0] is the subcommand's own name.
 int light_teach_command(int argc, char **argv);
+int light_map_command(int argc, char **argv);
 int light_list_command(int argc, char **argv);
 int light_points_command(int argc, char **argv);
 

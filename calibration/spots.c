@@ -128,3 +128,23 @@ bool spots_scale(struct bench *b, const char *lamp, const struct luminance_map *
         *out = found;
     return fine;
 }
+
+bool spots_apply(const struct luminance_map *map, const struct spot_reading *readings, int count,
+                 struct spot_scale *out, struct error *err)
+{
+    struct spot_scale given = {.count = count};
+    for (int i = 0; i < count; i++) {
+        const struct spot_reading *r = &readings[i];
+        double there = luminance_map_spot(map, r->x_m, r->z_m, SPOT_M);
+        if (!(there > 0 && r->cdm2 > 0))
+            return fail(err, ERROR_DATA,
+                        "spot reading %d, %g cd/m2 at x %.3f z %.3f m: the map is dark there, "
+                        "clipped, or ends before",
+                        i + 1, r->cdm2, r->x_m, r->z_m);
+        given.ratios[i] = r->cdm2 / there;
+    }
+    if (count < 1 || !agree(&given, err))
+        return false;
+    *out = given;
+    return true;
+}

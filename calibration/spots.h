@@ -22,4 +22,15 @@ struct spot_scale {
 bool spots_scale(struct bench *b, const char *lamp, const struct luminance_map *map,
                  struct spot_scale *out, struct error *err);
 
+// A reading that somebody took: luminance of a disc of 10 mm.
+struct spot_reading {
+    double x_m, z_m, cdm2; // booth frame
+};
+
+// The same from readings at hand, 1..SPOTS_MOST. Errors: DATA for a place that
+// is dark in the map or outside it, or when they contradict each other by more
+// than 2 %.
+bool spots_apply(const struct luminance_map *map, const struct spot_reading *readings, int count,
+                 struct spot_scale *out, struct error *err);
+
 #endif

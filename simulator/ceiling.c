@@ -7,6 +7,11 @@
 
 static const double trim_m = 0.012; // dark frame around the ceiling
 
+double ceiling_trim_m(void)
+{
+    return trim_m;
+}
+
 static double pixel_x(const struct ceiling_image *c, int column)
 {
     return ((column + 0.5) / c->width - 0.5) * c->width_m;

@@ -23,6 +23,9 @@ struct ceiling_image {
 bool ceiling_make(const struct scenario_ceiling *ceiling, const struct scenario_lamp *lamp,
                   int seed, struct ceiling_image *out, struct error *err);
 
+// Width of the dark trim.
+double ceiling_trim_m(void);
+
 // Accepts a zeroed image.
 void ceiling_fini(struct ceiling_image *image);
 

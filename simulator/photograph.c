@@ -183,10 +183,11 @@ static bool write_calibration(const struct shoot *s, struct error *err)
         return false;
     fprintf(file.stream,
             "[camera]\nwidth_px = %d\nheight_px = %d\nfx_px = %.9g\nfy_px = %.9g\n"
-            "cx_px = %.9g\ncy_px = %.9g\nk1 = %.9g\nk2 = %.9g\nk3 = %.9g\np1 = %.9g\np2 = %.9g\n",
+            "cx_px = %.9g\ncy_px = %.9g\nk1 = %.9g\nk2 = %.9g\nk3 = %.9g\np1 = %.9g\np2 = %.9g\n"
+            "\n[ceiling]\ntop = near\ninset_m = %.9g\n",
             c->width_px, c->height_px, c->focal_px, c->focal_px, s->lens.axis_px[0],
             s->lens.axis_px[1], c->radial[0], c->radial[1], c->radial[2], c->decentred[1],
-            c->decentred[0]);
+            c->decentred[0], ceiling_trim_m());
     return whole_file_commit(&file, err);
 }
 

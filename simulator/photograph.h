@@ -13,7 +13,8 @@
 //   dark-NN.png                 the longest ones with a capped lens
 //   flat-NN.png                 a field of equal luminance
 //   list.csv                    "file,exposure_s,light|dark|flat" a line
-//   camera.ini                  the lens as a calibration would find it
+//   camera.ini                  the lens as a calibration would find it, and how
+//                               far the ceiling's dark trim reaches in
 //   truth.exr                   luminance of the ceiling, cd/m2, averaged over
 //                               the pixels of the camera map
 // A new object with folder, frames (of light), corners_px: where the ceiling's
