@@ -13,25 +13,6 @@
 
 static const unsigned STAND_ROWS = 1u << STORED_HINGE | 1u << STORED_CENTRE | 1u << STORED_TURNED;
 
-bool geometry_settings(const char *config, struct booth_settings *booth, bool *placed,
-                       struct error *err)
-{
-    struct booth_calibration calibration;
-    struct booth_settings b;
-    if (!booth_load(config, NULL, 0, &b, err))
-        return false;
-    int rule = b.calibration.expired;
-    b.calibration.expired = EXPIRED_WARN;
-    unsigned given = b.given;
-    // One that is no good otherwise is refused when a version is to be based on it.
-    booth_from_store(&b, clock_utc_s(), &calibration, NULL);
-    *placed = booth_is_placed(&b);
-    b.calibration.expired = rule;
-    b.given = given;
-    *booth = b;
-    return true;
-}
-
 bool geometry_can_store(const struct booth_settings *booth, struct error *err)
 {
     struct store_place place;

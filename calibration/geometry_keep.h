@@ -23,12 +23,6 @@ struct geometry_value {
     double value, uncertainty; // expanded, k = 2; 0 = kept as it was
 };
 
-// Settings as the bench needs them: with the geometry of the store where that
-// is in force and nothing else is given, even of a calibration that has expired.
-// *placed: whether anything says where the screen is.
-bool geometry_settings(const char *config, struct booth_settings *booth, bool *placed,
-                       struct error *err);
-
 // Makes sure, before anything is measured, that the store can take a new version.
 bool geometry_can_store(const struct booth_settings *booth, struct error *err);
 

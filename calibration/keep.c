@@ -25,8 +25,8 @@ static const char USAGE[] =
     "  --json             one JSON object\n"
     "  --help\n"
     "\n"
-    "With a display model or a lamp the calibration is valid anew, else as long as the one\n"
-    "that it is based on.";
+    "With a display model the calibration is valid anew, else as long as the one that it is\n"
+    "based on.";
 
 struct item {
     bool (*keep)(struct store_draft *draft, const char *path, struct error *err);
@@ -50,7 +50,7 @@ static bool take_item(struct options *o, int c, const char *path, struct error *
                  : c == 'l' ? store_keep_lamp
                  : c == 'g' ? store_keep_geometry
                             : store_keep_file;
-    o->renews = o->renews || c == 'd' || c == 'l';
+    o->renews = o->renews || c == 'd';
     return true;
 }
 

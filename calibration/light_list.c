@@ -7,6 +7,7 @@
 
 #include "calibration/commands.h"
 #include "calibration/light.h"
+#include "calibration/store_keep.h"
 #include "calibration/teach.h"
 
 struct options {
@@ -153,7 +154,8 @@ int light_list_command(int argc, char **argv)
         return command_failed(&err);
     }
     booth_preset(booth);
-    if ((o.config && !booth_load(o.config, NULL, 0, booth, &err)) ||
+    bool placed;
+    if ((o.config && !store_settings(o.config, booth, &placed, &err)) ||
         !lamps_load(o.folder ? o.folder : booth->lamps.folder, &lamps, &err))
         code = command_failed(&err);
     else

@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <getopt.h>
 #include <jansson.h>
+#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "base/number.h"
 #include "calibration/commands.h"
 #include "calibration/light.h"
+#include "calibration/store_keep.h"
 #include "calibration/teach.h"
+#include "config/booth_store.h"
+#include "config/paths.h"
 
 struct options {
     const char *name, *config, *socket, *booth, *map;
@@ -123,12 +127,48 @@ static void print_json(const struct options *o, const struct teaching *t)
     json_decref(all);
 }
 
+// In a draft of the store, beside the lamps that are there.
+static bool teach_in_draft(const struct options *o, struct booth_settings *s, struct bench *bench,
+                           struct store_draft *d, struct teaching *t, struct error *err)
+{
+    char folder[PATH_MAX], ini[PATH_MAX];
+    snprintf(folder, sizeof folder, "%s/" STORE_LAMPS, d->folder);
+    return path_absolute(folder, s->lamps.folder, sizeof s->lamps.folder, err) &&
+           teach_lamp(bench, s, o->name, o->map, &o->plan, t, err) &&
+           snprintf(ini, sizeof ini, "%s/%s.ini", s->lamps.folder, o->name) > 0 &&
+           store_keep_lamp(d, ini, err);
+}
+
+static bool teach_into_store(const struct options *o, struct booth_settings *s, struct bench *bench,
+                             struct teaching *t, struct error *err)
+{
+    struct store_place place;
+    struct store_draft d;
+    char note[128], folder[PATH_MAX];
+    int number;
+    if (!booth_store_place(s, &place, err) || !store_begin(&place, true, &d, err))
+        return false;
+    snprintf(note, sizeof note, "lamp %s taught", o->name);
+    struct store_manifest facts = store_facts(s, &d, false, note);
+    if (!teach_in_draft(o, s, bench, &d, t, err)) {
+        store_abandon(&d);
+        return false;
+    }
+    if (!store_commit(&d, &facts, &number, err))
+        return false;
+    snprintf(folder, sizeof folder, "%s/%04d/" STORE_LAMPS, place.folder, number);
+    return path_absolute(folder, s->lamps.folder, sizeof s->lamps.folder, err);
+}
+
 static bool teach(const struct options *o, struct booth_settings *s, struct bench *bench,
                   struct teaching *t, struct error *err)
 {
-    return booth_load(o->config, NULL, 0, s, err) &&
-           bench_open(bench, s, o->socket, o->booth, err) &&
-           teach_lamp(bench, s, o->name, o->map, &o->plan, t, err) && bench_reload(bench, err);
+    if (!booth_load(o->config, NULL, 0, s, err) || !bench_open(bench, s, o->socket, o->booth, err))
+        return false;
+    bool stored = *s->calibration.store && !(s->given & 1u << STORED_LAMPS);
+    return (stored ? teach_into_store(o, s, bench, t, err)
+                   : teach_lamp(bench, s, o->name, o->map, &o->plan, t, err)) &&
+           bench_reload(bench, err);
 }
 
 int light_teach_command(int argc, char **argv)

@@ -12,6 +12,24 @@
 #include "config/geometry.h"
 #include "config/lamps.h"
 
+bool store_settings(const char *config, struct booth_settings *booth, bool *placed,
+                    struct error *err)
+{
+    struct booth_calibration calibration;
+    struct booth_settings b;
+    if (!booth_load(config, NULL, 0, &b, err))
+        return false;
+    int rule = b.calibration.expired;
+    b.calibration.expired = EXPIRED_WARN;
+    unsigned given = b.given;
+    booth_from_store(&b, clock_utc_s(), &calibration, NULL);
+    *placed = booth_is_placed(&b);
+    b.calibration.expired = rule;
+    b.given = given;
+    *booth = b;
+    return true;
+}
+
 struct store_manifest store_facts(const struct booth_settings *booth, const struct store_draft *d,
                                   bool renews, const char *note)
 {
@@ -32,7 +50,9 @@ bool store_keep_lamp(struct store_draft *d, const char *ini, struct error *err)
     char path[PATH_MAX];
     if (!lamp_load(ini, &lamp, err))
         return false;
-    if (*lamp.file.map) {
+    size_t length = strlen(d->folder);
+    bool inside = !strncmp(lamp.file.map, d->folder, length) && lamp.file.map[length] == '/';
+    if (*lamp.file.map && !inside) {
         snprintf(path, sizeof path, STORE_LAMPS "/%s.exr", lamp.file.name);
         if (!store_put(d, lamp.file.map, path, err))
             return false;

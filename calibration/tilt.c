@@ -10,6 +10,7 @@
 #include "calibration/commands.h"
 #include "calibration/geometry_keep.h"
 #include "calibration/pose_files.h"
+#include "calibration/store_keep.h"
 
 enum { LOOKS = 10, VALUES = STAND_PARAMETER_COUNT };
 
@@ -320,7 +321,7 @@ static bool find(const struct options *o, struct booth_settings *booth, struct s
 {
     struct stand_problem p = {.instruments = o->instruments};
     bool placed;
-    if (!geometry_settings(o->keep.config, booth, &placed, err) ||
+    if (!store_settings(o->keep.config, booth, &placed, err) ||
         (o->keep.store && !geometry_can_store(booth, err)))
         return false;
     p.screen = booth->screen;

@@ -11,6 +11,7 @@
 #include "calibration/commands.h"
 #include "calibration/geometry_keep.h"
 #include "calibration/pose_files.h"
+#include "calibration/store_keep.h"
 
 enum { LOOKS = 25, VALUES = TRACKER_PARAMETER_COUNT, STANDOFFS_MOST = TRACKER_POINTS_MOST / 5 };
 
@@ -281,7 +282,7 @@ static bool find(const struct options *o, struct booth_settings *booth, struct p
 {
     struct tracker_problem problem;
     bool placed;
-    if (!geometry_settings(o->keep.config, booth, &placed, err) ||
+    if (!store_settings(o->keep.config, booth, &placed, err) ||
         (o->keep.store && !geometry_can_store(booth, err)))
         return false;
     if (!placed)

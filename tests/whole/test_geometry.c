@@ -65,6 +65,7 @@ static void put_settings(void)
     exchange(text, sizeof text, "hinge_m = 0 0 0\ncentre_from_hinge_m = 0 0.20 0.03\n", "");
     exchange(text, sizeof text, "place_m = 0 0.35 -0.20\npitch_deg = 10\n", "");
     exchange(text, sizeof text, "model = display.ini", "serial = panel 1\noutput = offscreen");
+    exchange(text, sizeof text, "folder = lamps", "");
     snprintf(more, sizeof more,
              "\n[materials]\nfolder = %s\n[control]\nsocket = boothd.sock\n"
              "[calibration]\nstore = store\n",
@@ -221,6 +222,37 @@ static void the_daemon_goes_by_what_was_found(void **state)
     assert_near(eye, 0, EYE_M);
 }
 
+static void a_lamp_taught_alone_becomes_a_version_of_the_store_too(void **state)
+{
+    (void)state;
+    char socket[300];
+    snprintf(socket, sizeof socket, "%s", folder_at(&here.folder, "run/boothsim.sock"));
+    const char *teach[] = {program_path("boothcal"),
+                           "light",
+                           "teach",
+                           "D65",
+                           "--config",
+                           config,
+                           "--booth",
+                           socket,
+                           "--drift",
+                           "20",
+                           "--readings",
+                           "3",
+                           NULL};
+    const char *list[] = {program_path("boothcal"), "light", "list", "--config", config, NULL};
+    char text[4096];
+    assert_int_equal(run_program(teach, folder_at(&here.folder, "words")), 0);
+    assert_holds(read_words(folder_at(&here.folder, "words"), text, sizeof text),
+                 "0003/lamps/D65.ini: ");
+    assert_int_equal(run_program(list, folder_at(&here.folder, "words")), 0);
+    assert_holds(read_words(folder_at(&here.folder, "words"), text, sizeof text), "D65");
+    json_t *status = booth_status(daemon_client);
+    assert_near(dig_real(status, "calibration.version"), 3, 0);
+    assert_near(dig_real(status, "lamp.taught"), 1, 0);
+    json_decref(status);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -228,6 +260,7 @@ int main(void)
         cmocka_unit_test(poses_kept_in_a_file_give_the_same_again),
         cmocka_unit_test(the_tracker_is_found_where_it_is),
         cmocka_unit_test(the_daemon_goes_by_what_was_found),
+        cmocka_unit_test(a_lamp_taught_alone_becomes_a_version_of_the_store_too),
     };
     return cmocka_run_group_tests(tests, open_booth, close_booth);
 }
