@@ -15,11 +15,12 @@ boothcal_in := calibration
 boothsim_in := simulator
 
 PACKAGES := git make gcc g++ libc6-dev pkg-config libusb-1.0-0-dev libudev-dev libmodbus-dev libhidapi-dev libiio-dev \
-  libopencv-core-dev libopencv-calib3d-dev libopencv-imgproc-dev libopencv-photo-dev libceres-dev libopenexr-dev libglfw3-dev libepoxy-dev \
-  libegl-dev libgl1-mesa-dri libinih-dev libjansson-dev libpng-dev libssl-dev liblcms2-dev libmatio-dev libsystemd-dev \
-  libcmocka-dev libumockdev-dev umockdev xvfb xauth systemd psychtoolbox-3-common clang-format
+  libopencv-core-dev libopencv-calib3d-dev libopencv-imgproc-dev libopencv-photo-dev libceres-dev libopenexr-dev \
+  libglfw3-dev libepoxy-dev libegl-dev libgl1-mesa-dri libinih-dev libjansson-dev libpng-dev libssl-dev liblcms2-dev \
+  libmatio-dev libpango1.0-dev libcairo2-dev librsvg2-dev libsystemd-dev libcmocka-dev libumockdev-dev umockdev xvfb xauth \
+  systemd psychtoolbox-3-common clang-format
 PKGS := libusb-1.0 libudev libmodbus hidapi-hidraw libiio OpenEXR glfw3 epoxy egl inih jansson libpng libcrypto lcms2 matio \
-  libsystemd cmocka umockdev-1.0
+  pangocairo librsvg-2.0 libsystemd cmocka umockdev-1.0
 
 OPTIMISE := -O2
 SANITIZE_sanitize := -fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer
@@ -39,7 +40,8 @@ simulator_libs   := $(shell pkg-config --libs umockdev-1.0 2>/dev/null) -lmodbus
 simulator_test_libs := -lusb-1.0 -lhidapi-hidraw
 render_libs      := -lglfw -lepoxy -lEGL -lm
 config_libs      := -lm
-calibration_libs := -llcms2 -lopencv_photo -lopencv_imgproc -lopencv_calib3d -lopencv_core -lceres -lglog -lmatio -lstdc++ -lm
+calibration_libs := $(shell pkg-config --libs pangocairo librsvg-2.0 2>/dev/null) -llcms2 -lopencv_photo -lopencv_imgproc \
+  -lopencv_calib3d -lopencv_core -lceres -lglog -lmatio -lstdc++ -lm
 daemon_libs      := -lsystemd -lpthread -lm
 
 # One short line a step; V=1 shows the whole commands.

@@ -10,10 +10,10 @@
 #include "calibration/audit_report.h"
 #include "calibration/bench.h"
 #include "calibration/commands.h"
+#include "calibration/teach.h"
 #include "config/lamps.h"
 
-enum { LIVE_READINGS = 10, PROBE_READINGS = 2, STEADY_ATTEMPTS = 50 };
-static const double STEADY = 0.005; // relative change of illuminance between two short readings
+enum { LIVE_READINGS = 10 };
 
 static const char USAGE[] =
     "usage: boothcal audit [NAME=]SPECTRUM... [--absolute] [--nine] [options]\n"
@@ -217,19 +217,6 @@ static bool from_folder(struct audit_facts *f, const char *folder, struct error 
     return fine && (f->lamp_count || fail(err, ERROR_CONFIG, "%s: no lamp was taught", folder));
 }
 
-static bool steady_light(struct bench *b, const char *lamp, struct error *err)
-{
-    struct taught now = {.lux = 0};
-    for (int attempt = 0; attempt < STEADY_ATTEMPTS; attempt++) {
-        double before = now.lux;
-        if (!bench_teach(b, lamp, PROBE_READINGS, &now, err))
-            return false;
-        if (before > 0 && fabs(now.lux / before - 1) < STEADY)
-            return true;
-    }
-    return fail(err, ERROR_RETRY, "lamp %s does not become steady; now %.0f lx", lamp, now.lux);
-}
-
 static bool read_nine(struct bench *b, struct audit_lamp *l, struct error *err)
 {
     static const char *const ROWS[] = {"far", "middle", "near"};
@@ -254,8 +241,9 @@ static bool read_lamp(struct bench *b, struct audit_facts *f, const char *name, 
                       struct error *err)
 {
     struct taught taught;
+    struct steadiness steadiness;
     struct audit_lamp *l = next_lamp(f, name, "read", err);
-    if (!l || !bench_lamp(b, name, err) || !steady_light(b, name, err) ||
+    if (!l || !teach_await(b, name, &TEACH_WHOLE, &steadiness, err) ||
         !bench_teach(b, name, LIVE_READINGS, &taught, err))
         return while_doing(err, "lamp %s", name);
     l->absolute = true;

@@ -77,15 +77,26 @@ bool bench_show(struct bench *b, const char *material, const char *patch, struct
     return done(daemon_call(b, request, err));
 }
 
-static bool take_xyz(const json_t *reply, const char *key, struct xyz *out, struct error *err)
+static bool take_numbers(const json_t *reply, const char *key, double *out, size_t count,
+                         struct error *err)
 {
     const json_t *v = json_object_get(reply, key);
-    if (json_array_size(v) != 3)
+    if (json_array_size(v) != count)
         return fail(err, ERROR_DATA, "the reply has no %s", key);
-    *out = (struct xyz){json_number_value(json_array_get(v, 0)), json_number_value(json_array_get(v, 1)),
-                        json_number_value(json_array_get(v, 2))};
-    if (!isfinite(out->X + out->Y + out->Z))
-        return fail(err, ERROR_DATA, "%s is not finite", key);
+    for (size_t i = 0; i < count; i++) {
+        out[i] = json_number_value(json_array_get(v, i));
+        if (!isfinite(out[i]))
+            return fail(err, ERROR_DATA, "%s is not finite", key);
+    }
+    return true;
+}
+
+static bool take_xyz(const json_t *reply, const char *key, struct xyz *out, struct error *err)
+{
+    double v[3];
+    if (!take_numbers(reply, key, v, 3, err))
+        return false;
+    *out = (struct xyz){v[0], v[1], v[2]};
     return true;
 }
 
@@ -111,12 +122,24 @@ bool bench_measure(struct bench *b, const char *what, struct xyz *xyz, int *inde
     return true;
 }
 
-bool bench_in_gamut(struct bench *b, int x_px, int y_px, bool *in_gamut, struct error *err)
+bool bench_pixel(struct bench *b, int x_px, int y_px, struct proofed_pixel *out, struct error *err)
 {
     json_t *reply =
         daemon_call(b, json_pack("{ss,si,si}", "do", CONTROL_PROBE, "x_px", x_px, "y_px", y_px), err);
-    *in_gamut = json_is_true(json_object_get(reply, "in_gamut"));
-    return done(reply);
+    if (!reply)
+        return false;
+    struct proofed_pixel p = {.lux = json_number_value(json_object_get(reply, "lux")),
+                      .in_gamut = json_is_true(json_object_get(reply, "in_gamut"))};
+    bool fine = take_xyz(reply, "surface", &p.surface, err) &&
+                take_xyz(reply, "emitted", &p.emitted, err) &&
+                take_xyz(reply, "sent", &p.sent, err) &&
+                take_numbers(reply, "rgb", (double *)&p.counts, 3, err) &&
+                take_numbers(reply, "linear", (double *)&p.linear, 3, err) &&
+                take_numbers(reply, "gains", p.gains, 4, err);
+    json_decref(reply);
+    if (fine)
+        *out = p;
+    return fine || while_doing(err, "probing the screen");
 }
 
 bool bench_capture(struct bench *b, const char *path, struct error *err)

@@ -52,8 +52,16 @@ bool bench_show(struct bench *b, const char *material, const char *patch, struct
 bool bench_measure(struct bench *b, const char *what, struct xyz *xyz, int *index,
                    struct error *err);
 
-// Whether the display reaches what it should show at the screen's centre.
-bool bench_in_gamut(struct bench *b, int x_px, int y_px, bool *in_gamut, struct error *err);
+// What a pixel of the material on show should be, by the double reference; see
+// struct pixel of render/scene.h.
+struct proofed_pixel {
+    double lux;
+    struct xyz surface, emitted, sent; // cd/m2
+    struct counts counts, linear;
+    double gains[4]; // of red, green, blue and black, towards the eye
+    bool in_gamut;
+};
+bool bench_pixel(struct bench *b, int x_px, int y_px, struct proofed_pixel *out, struct error *err);
 
 bool bench_capture(struct bench *b, const char *path, struct error *err);
 bool bench_reload(struct bench *b, struct error *err);

@@ -49,6 +49,7 @@ int command_audit(int argc, char **argv);
 int command_tilt(int argc, char **argv);
 int command_tracker(int argc, char **argv);
 int command_keep(int argc, char **argv);
+int command_report(int argc, char **argv);
 int command_history(int argc, char **argv);
 int command_diff(int argc, char **argv);
 int command_use(int argc, char **argv);

@@ -9,7 +9,8 @@
 
 #include "calibration/spots.h"
 #include "calibration/statistics.h"
-#include "colorimetry/colour.h"
+#include "colorimetry/display.h"
+#include "render/stand.h"
 
 enum { FACTS_PATCHES = 64, FACTS_LAMPS = 8, FACTS_POSES = 32 };
 
@@ -19,6 +20,10 @@ struct patch_report {
     char name[64];
     struct xyz reference; // what a physical sample sends from that place
     struct xyz measured;  // what the radiometer read from the screen
+    struct xyz expected;  // what such a sample sends by the taught spectrum and the luminance map
+    struct xyz aimed;     // what boothd wanted to reach the eye
+    struct xyz predicted; // what its models say that reached the eye
+    struct counts counts; // before rounding, 0..1
     struct xyz full;      // relative, Y = 100: full spectrum under the taught lamp
     struct xyz bands;     // relative, Y = 100: band coefficients under the taught lamp
     bool in_gamut;        // the display model reaches it
@@ -52,6 +57,15 @@ struct lamp_report {
     struct proof_summary proof;
     bool reached;      // every target of proof.h
     char picture[512]; // PNG of what the screen showed
+    char map[512];     // luminance map, as photographed: times map_scale it is absolute
+    double spot_x_m[SPOTS_MOST], spot_z_m[SPOTS_MOST];
+    double proof_lux;       // on the screen's centre, by the daemon, when the chart was shown
+    double gains[4];        // of the display towards the eye: red, green, blue, black
+    struct xyz black_shown; // black under the lamp, as read: the display's own and its reflection
+    int repeats;            // readings of the perfect diffuser, one after the other
+    double repeat_level;    // their relative standard deviation of Y
+    double repeat_colour;   // and of X / Y and Z / Y, rms
+    double chart_drift_percent; // of the perfect diffuser over the chart's readings
 };
 
 struct display_report {
@@ -61,6 +75,8 @@ struct display_report {
     double condition;
     struct xyz white, black;
     double white_drift_percent; // largest change of repeated white readings
+    double warm_up_s, warm_up_percent_h; // waited for white to stand still; its slope then
+    double settle_s;                     // waited after each patch
 };
 
 // How the display's light depends on direction and place; see view_fit.h.
@@ -81,7 +97,30 @@ struct pose_report {
     double error_percent;
 };
 
+// Where everything stood while the chart was proofed.
+struct place_report {
+    struct screen screen;
+    struct stand stand;
+    double tilt_deg;
+    struct vec3 eye;          // booth frame, m
+    double centre_m[3], width_m, depth_m; // of the ceiling
+    double reflectance;       // of the screen's surface
+    int bits;
+    bool dither;
+};
+
+// A patch of the chart as the material's file has it.
+struct chart_report {
+    char name[64];
+    struct spectrum reflectance;
+};
+
 struct session_facts {
+    char environment[256]; // what was noted of it, "" = nothing
+    char config[512], material[512];
+    struct place_report place;
+    int chart_count;
+    struct chart_report chart[FACTS_PATCHES];
     char booth[128], started[32], finished[32], software[64], observer[16];
     bool emulated;
     bool truth_emulated; // reference comes from the emulated booth, else from the taught spectrum

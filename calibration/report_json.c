@@ -1,123 +1,234 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <math.h>
+
+#include "calibration/facts_json.h"
+#include "calibration/proof.h"
 #include "calibration/report.h"
 
-#include "calibration/proof.h"
+#define OWNER budget_figure
+static const struct field figure_fields[] = {
+    F_NUMBER("value", value),
+    F_NUMBER("u", u),
+    F_NUMBERS("share", share),
+    {0},
+};
+#undef OWNER
 
-static json_t *json_xyz(struct xyz c)
-{
-    return json_pack("[fff]", c.X, c.Y, c.Z);
-}
+#define OWNER budget_difference
+static const struct field difference_fields[] = {
+    F_OBJECT("L", L, figure_fields),
+    F_OBJECT("C", C, figure_fields),
+    F_OBJECT("H", H, figure_fields),
+    F_OBJECT("E00", E, figure_fields),
+    {0},
+};
+#undef OWNER
 
-static json_t *json_summary(const struct summary *s)
-{
-    return json_pack("{si,sf,sf,sf,sf,sf,sf,sf}", "n", s->n, "mean", s->mean, "std", s->std, "median",
-                     s->median, "p90", s->p90, "p95", s->p95, "p99", s->p99, "max", s->max);
-}
+#define OWNER budget_overall
+static const struct field overall_fields[] = {
+    F_NUMBER("mean", mean),
+    F_NUMBER("mean_u", mean_u),
+    F_NUMBER("max", max),
+    F_NUMBER("max_u", max_u),
+    {0},
+};
+#undef OWNER
 
-static json_t *json_patch(const struct patch_report *p)
-{
-    return json_pack("{ss,so,so,so,so,sb,si,sf,sf,sf}", "name", p->name, "reference_cdm2",
-                     json_xyz(p->reference), "measured_cdm2", json_xyz(p->measured), "full_relative",
-                     json_xyz(p->full), "bands_relative", json_xyz(p->bands), "in_gamut", p->in_gamut,
-                     "reading", p->reading, "de00_simulation", p->de_simulation, "de00_published",
-                     p->de_published, "de00_absolute", p->de_absolute);
-}
+#define OWNER report_lamp
+static const struct field outside_fields[] = {
+    F_OBJECT("absolute_out_of_gamut", absolute_out, summary_fields),
+    F_OBJECT("published_out_of_gamut", published_out, summary_fields),
+    F_OBJECT("floor_absolute", floor_absolute, summary_fields),
+    F_OBJECT("floor_published", floor_published, summary_fields),
+    {0},
+};
+#undef OWNER
 
-static json_t *json_lamp(const struct lamp_report *l)
+#define OWNER booth_light
+static const struct field light_fields[] = {
+    F_NUMBER("lux", lux),
+    F_NUMBER("by_tilt_per_deg", by_tilt),
+    F_NUMBER("by_up_per_m", by_up),
+    F_NUMBER("by_near_per_m", by_near),
+    F_NUMBERS("by_shape", by_shape),
+    {0},
+};
+#undef OWNER
+
+static json_t *names(int count, const char *(*name)(int))
 {
-    json_t *patches = json_array(), *irradiance = json_array();
-    for (int i = 0; i < l->patch_count; i++)
-        json_array_append_new(patches, json_patch(&l->patches[i]));
-    for (int i = 0; i < SPECTRUM_COUNT; i++)
-        json_array_append_new(irradiance, json_real(l->irradiance.v[i]));
-    json_t *out = json_pack(
-        "{ss,ss,sf,sf,si,s[ff],sf,si,so,so,sf,s:{so,so,so,so,so},ss,so,so}", "name", l->name,
-        "emulated_spectrum", l->asked, "lux", l->lux, "spread", l->spread, "teach_readings",
-        l->teach_readings, "xy", l->chromaticity.x, l->chromaticity.y, "map_scale", l->map_scale,
-        "spot_readings", l->spots, "white_reference_cdm2", json_xyz(l->white_reference),
-        "white_measured_cdm2", json_xyz(l->white_measured), "white_luminance_error_percent",
-        l->white_error_percent, "de00", "simulation", json_summary(&l->proof.simulation), "published",
-        json_summary(&l->proof.published), "published_in_gamut",
-        json_summary(&l->proof.published_in_gamut), "absolute", json_summary(&l->proof.absolute),
-        "absolute_in_gamut", json_summary(&l->proof.absolute_in_gamut), "picture", l->picture,
-        "patches", patches, "irradiance_360_830_W_m2_nm", irradiance);
-    json_t *ratios = json_array();
-    for (int i = 0; i < l->spots; i++)
-        json_array_append_new(ratios, json_real(l->spot_ratios[i]));
-    json_object_set_new(out, "spot_ratios", ratios);
-    json_object_set_new(out, "reached", json_boolean(l->reached));
-    json_object_set_new(out, "white_taught_relative", json_xyz(l->white_taught));
-    json_object_set_new(out, "cct_K", l->cct.valid ? json_real(l->cct.kelvin) : json_null());
-    json_object_set_new(out, "duv", l->cct.valid ? json_real(l->cct.duv) : json_null());
+    json_t *out = json_array();
+    for (int i = 0; i < count; i++)
+        json_array_append_new(out, json_string(name(i)));
     return out;
 }
 
-static json_t *json_display(const struct display_report *d)
+static const char *cause_name(int i)
 {
-    return json_pack("{ss,ss,si,si,so,so,sf,so,so,sf}", "measurements", d->measurements, "model",
-                     d->model, "patches", d->patches, "verification_patches", d->verified, "fit_de00",
-                     json_summary(&d->fit), "verification_de00", json_summary(&d->verification),
-                     "condition", d->condition, "white_cdm2", json_xyz(d->white), "black_cdm2",
-                     json_xyz(d->black), "white_drift_percent", d->white_drift_percent);
+    return budget_cause_name((enum budget_cause)i);
 }
 
-static json_t *json_pose(const struct pose_report *p)
+static const char *step_name(int i)
 {
-    json_t *out = json_pack("{sf,sf,s[fff],s[fff]}", "tilt_deg", p->tilt_deg, "tilt_seen_deg",
-                            p->tilt_seen_deg, "eye_m", p->eye.x, p->eye.y, p->eye.z, "eye_seen_m",
-                            p->eye_seen.x, p->eye_seen.y, p->eye_seen.z);
-    if (p->off_axis)
-        json_object_set_new(out, "off_normal_deg", json_real(p->off_normal_deg));
-    if (p->moved_screen) {
-        json_object_set_new(out, "white_reference_cdm2", json_xyz(p->reference));
-        json_object_set_new(out, "white_measured_cdm2", json_xyz(p->measured));
-        json_object_set_new(out, "white_luminance_error_percent", json_real(p->error_percent));
+    return report_step_name((enum report_step)i);
+}
+
+static json_t *numbers(const double *v, int count)
+{
+    json_t *out = json_array();
+    for (int i = 0; i < count; i++)
+        json_array_append_new(out, isnan(v[i]) ? json_null() : json_real(v[i]));
+    return out;
+}
+
+static json_t *budget_json(const struct budget *b)
+{
+    json_t *absolute = json_array(), *published = json_array();
+    for (int i = 0; i < b->count; i++) {
+        json_array_append_new(absolute, fields_as_json(difference_fields, &b->absolute[i]));
+        json_array_append_new(published, fields_as_json(difference_fields, &b->published[i]));
+    }
+    return json_pack("{si,so,so,so,so}", "draws", b->draws, "absolute", absolute, "published",
+                     published, "absolute_in_gamut",
+                     fields_as_json(overall_fields, &b->absolute_all), "published_in_gamut",
+                     fields_as_json(overall_fields, &b->published_all));
+}
+
+static json_t *worst_json(const struct lamp_report *from, const struct report_lamp *lamp)
+{
+    json_t *out = json_array();
+    for (int i = 0; i < lamp->worst_count; i++) {
+        const struct patch_report *p = &from->patches[lamp->worst[i]];
+        json_array_append_new(
+            out, json_pack("{ss,sf}", "name", p->name, "de00_absolute", p->de_absolute));
     }
     return out;
 }
 
-// Null when it was not measured.
-static json_t *json_view(const struct view_report *v)
+static void add_patches(json_t *patches, const struct report_lamp *lamp)
 {
-    if (!v->measured)
-        return json_null();
-    return json_pack("{si,si,sf,sf,sf,sf,sf,sf}", "directions", v->directions, "places", v->places,
-                     "white_before_de00", v->before_de00, "white_after_de00", v->after_de00,
-                     "white_before_percent", v->before_percent, "white_after_percent",
-                     v->after_percent, "place_de00", v->place_de00, "place_percent",
-                     v->place_percent);
+    size_t i;
+    json_t *patch;
+    json_array_foreach(patches, i, patch)
+    {
+        const struct report_patch *p = &lamp->patches[i];
+        json_object_set_new(patch, "floor_de00_absolute", json_real(p->floor_absolute));
+        json_object_set_new(patch, "floor_de00_published", json_real(p->floor_published));
+        json_object_set_new(patch, "steps_de00", numbers(p->steps, STEPS));
+    }
 }
 
-static json_t *json_published(void)
+static void add_lamp(json_t *out, const struct lamp_report *from, const struct report_lamp *lamp)
+{
+    if (!from->cct.valid) {
+        json_object_set_new(out, "cct_K", json_null());
+        json_object_set_new(out, "duv", json_null());
+    }
+    if (lamp->split)
+        add_patches(json_object_get(out, "patches"), lamp);
+    json_t *more = fields_as_json(outside_fields, lamp);
+    json_object_update(json_object_get(out, "de00"), more);
+    json_decref(more);
+    json_object_set_new(out, "worst", worst_json(from, lamp));
+    json_object_set_new(out, "steps_rms_de00",
+                        lamp->split ? numbers(lamp->steps, STEPS) : json_null());
+    json_object_set_new(out, "black_cdm2",
+                        lamp->split ? json_pack("{sf,sf}", "expected", lamp->black_expected,
+                                                "shown", lamp->black_shown)
+                                    : json_null());
+    if (lamp->budgeted) {
+        json_object_set_new(out, "light", fields_as_json(light_fields, &lamp->light));
+        json_object_set_new(out, "budget_measured", budget_json(&lamp->measured));
+        json_object_set_new(out, "budget_shown", budget_json(&lamp->shown));
+    } else {
+        json_object_set_new(out, "budget_not_computed", json_string(lamp->no_budget));
+    }
+}
+
+// A pose where only the head moved has no white.
+static void trim_poses(json_t *poses, const struct session_facts *f)
+{
+    size_t i;
+    json_t *pose;
+    json_array_foreach(poses, i, pose)
+    {
+        if (!f->poses[i].off_axis)
+            json_object_del(pose, "off_normal_deg");
+        if (f->poses[i].moved_screen)
+            continue;
+        json_object_del(pose, "white_reference_cdm2");
+        json_object_del(pose, "white_measured_cdm2");
+        json_object_del(pose, "white_luminance_error_percent");
+    }
+}
+
+static json_t *published_json(void)
 {
     json_t *rows = json_array();
     for (int i = 0; i < 3; i++) {
         const struct published_row *r = &published_table[i];
-        json_array_append_new(
-            rows, json_pack("{ss,s[ffff],s[ffff],s[ffff]}", "lamp", r->lamp, "simulation",
-                            r->simulation[0], r->simulation[1], r->simulation[2], r->simulation[3],
-                            "screen", r->screen[0], r->screen[1], r->screen[2], r->screen[3],
-                            "screen_in_gamut", r->in_gamut[0], r->in_gamut[1], r->in_gamut[2],
-                            r->in_gamut[3]));
+        json_array_append_new(rows,
+                              json_pack("{ss,so,so,so}", "lamp", r->lamp, "simulation",
+                                        numbers(r->simulation, 4), "screen", numbers(r->screen, 4),
+                                        "screen_in_gamut", numbers(r->in_gamut, 4)));
     }
     return rows;
 }
 
-json_t *report_as_json(const struct session_facts *f)
+static json_t *missing_json(const struct report *r)
 {
-    json_t *lamps = json_array(), *poses = json_array();
-    for (int i = 0; i < f->lamp_count; i++)
-        json_array_append_new(lamps, json_lamp(&f->lamps[i]));
-    for (int i = 0; i < f->pose_count; i++)
-        json_array_append_new(poses, json_pose(&f->poses[i]));
-    return json_pack(
-        "{ss,ss,ss,ss,ss,sb,ss,sf,so,so,so,so,so,sO,sO,s{sf,sf,sf}}", "booth", f->booth, "started", f->started,
-        "finished", f->finished, "software", f->software, "observer", f->observer, "emulated",
-        f->emulated, "reference",
-        f->truth_emulated ? "physical sample in the emulated booth, 1 nm integration"
-                          : "taught spectrum and luminance map, 1 nm integration",
-        "seconds", f->seconds, "display", json_display(&f->display), "view", json_view(&f->view), "lamps", lamps, "poses", poses,
-        "published_mean_std_p90_max", json_published(), "settings", f->settings, "readings",
-        f->readings, "targets", "de00_mean", PROOF_MEAN_MOST, "de00_max", PROOF_MAX_MOST,
-        "white_percent", PROOF_WHITE_PERCENT_MOST);
+    json_t *out = json_array();
+    for (int i = 0; i < r->missing_count; i++)
+        json_array_append_new(out, json_string(r->missing[i]));
+    return out;
+}
+
+static json_t *uncertainties_json(const struct uncertainties *u)
+{
+    json_t *out = json_object();
+    for (const struct setting *row = uncertainty_settings; row->name; row++) {
+        char text[64];
+        settings_get(row, u, text, sizeof text);
+        json_object_set_new(out, row->name, json_string(text));
+    }
+    return out;
+}
+
+static void add_provenance(json_t *out, const struct report *r)
+{
+    json_object_set_new(out, "settings_sha256", json_string(r->settings_sha256));
+    json_object_set_new(out, "uncertainty", uncertainties_json(&r->u));
+    json_object_set_new(out, "causes", names(CAUSES, cause_name));
+    json_object_set_new(out, "steps", names(STEPS, step_name));
+    json_object_set_new(out, "published_mean_std_p90_max", published_json());
+    json_object_set_new(out, "targets",
+                        json_pack("{sf,sf,sf}", "de00_mean", PROOF_MEAN_MOST, "de00_max",
+                                  PROOF_MAX_MOST, "white_percent", PROOF_WHITE_PERCENT_MOST));
+    json_object_set_new(out, "normalisation",
+                        json_string("absolute: cd/m2, white of CIELAB the perfect diffuser at that "
+                                    "place; published: each set over 1.13 times its own white "
+                                    "patch, CAT02 (D = 1) to D65"));
+    json_object_set_new(out, "inputs", sealed_inputs_json(&r->inputs));
+    json_object_set_new(out, "inputs_missing", missing_json(r));
+    json_object_set_new(out, "seal", json_string(SEAL_BLANK));
+}
+
+json_t *report_as_json(const struct report *r)
+{
+    json_t *out = fields_as_json(session_fields, r->facts);
+    if (!out)
+        return NULL;
+    json_object_set_new(out, "kind", json_string("boothd report"));
+    json_object_set_new(out, "reference",
+                        json_string(r->facts->truth_emulated
+                                        ? "physical sample in the emulated booth, 1 nm integration"
+                                        : "taught spectrum and luminance map, 1 nm integration"));
+    if (!r->facts->view.measured)
+        json_object_set_new(out, "view", json_null());
+    for (int i = 0; i < r->facts->lamp_count; i++)
+        add_lamp(json_array_get(json_object_get(out, "lamps"), (size_t)i), &r->facts->lamps[i],
+                 &r->lamps[i]);
+    trim_poses(json_object_get(out, "poses"), r->facts);
+    add_provenance(out, r);
+    return out;
 }

@@ -6,7 +6,8 @@
 
 static void row(FILE *out, const char *what, const struct summary *s)
 {
-    fprintf(out, "  %-36s %6.2f %6.2f %6.2f %6.2f  %3d\n", what, s->mean, s->std, s->p90, s->max, s->n);
+    fprintf(out, "  %-36s %6.2f %6.2f %6.2f %6.2f  %3d\n", what, s->mean, s->std, s->p90, s->max,
+            s->n);
 }
 
 static void published_line(FILE *out, const char *what, const double v[4])
@@ -51,16 +52,18 @@ void report_as_text(const struct session_facts *f, FILE *out)
     const struct display_report *d = &f->display;
     fprintf(out, "%s, %s, observer %s%s\n", f->booth, f->software, f->observer,
             f->emulated ? ", EMULATED instruments" : "");
-    fprintf(out, "Display model: %d patches fitted, dE00 mean %.2f max %.2f; %d others, mean %.2f max %.2f\n",
+    fprintf(out,
+            "Display model: %d patches fitted, dE00 mean %.2f max %.2f; %d others, mean %.2f max "
+            "%.2f\n",
             d->patches, d->fit.mean, d->fit.max, d->verified, d->verification.mean,
             d->verification.max);
     if (f->view.measured)
-        fprintf(out,
-                "Display by direction: %d directions, white up to %+.1f %% (dE00 %.2f), corrected to "
-                "%+.2f %% (%.2f); by place: up to %+.1f %% (%.2f)\n",
-                f->view.directions, f->view.before_percent, f->view.before_de00,
-                f->view.after_percent, f->view.after_de00, f->view.place_percent,
-                f->view.place_de00);
+        fprintf(
+            out,
+            "Display by direction: %d directions, white up to %+.1f %% (dE00 %.2f), corrected to "
+            "%+.2f %% (%.2f); by place: up to %+.1f %% (%.2f)\n",
+            f->view.directions, f->view.before_percent, f->view.before_de00, f->view.after_percent,
+            f->view.after_de00, f->view.place_percent, f->view.place_de00);
     for (int i = 0; i < f->lamp_count; i++)
         lamp_table(out, &f->lamps[i]);
     fprintf(out, "\nMoved screen and head\n");

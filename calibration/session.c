@@ -12,6 +12,7 @@
 #include "base/clock.h"
 #include "base/number.h"
 #include "calibration/commands.h"
+#include "calibration/facts_json.h"
 #include "calibration/report.h"
 #include "config/paths.h"
 
@@ -136,6 +137,8 @@ static bool begin(struct session *s, const struct options *o, struct error *err)
         !bench_open(&s->bench, &s->settings, o->socket, o->booth, err))
         return false;
     f->readings = json_incref(s->bench.readings);
+    if (!path_absolute(o->config, f->config, sizeof f->config, err))
+        return false;
     snprintf(f->booth, sizeof f->booth, "%s", s->settings.booth.name);
     snprintf(f->software, sizeof f->software, "boothd %s", BOOTHD_VERSION);
     snprintf(f->observer, sizeof f->observer, "%s",
@@ -183,6 +186,21 @@ static bool reached(const struct session_facts *f)
     return all;
 }
 
+static bool write_report(const struct session *s, struct error *err)
+{
+    char path[512];
+    struct report *report = calloc(1, sizeof *report);
+    if (!report)
+        return fail(err, ERROR_SYSTEM, "out of memory for the report");
+    snprintf(path, sizeof path, "%s/session.json", s->out);
+    bool fine = facts_save(s->facts, path, err) &&
+                report_make(s->facts, s->out, NULL, REPORT_DRAWS, report, err) &&
+                report_save(report, s->out, err);
+    report_fini(report);
+    free(report);
+    return fine;
+}
+
 static bool run(struct session *s, const struct options *o, struct error *err)
 {
     int64_t began = clock_now_ns();
@@ -192,7 +210,7 @@ static bool run(struct session *s, const struct options *o, struct error *err)
                          json_is_true(json_object_get(s->facts->settings, "emulated"));
     clock_utc(s->facts->finished);
     s->facts->seconds = (double)(clock_now_ns() - began) / 1e9;
-    if (!report_save(s->facts, s->out, err) || !session_store(s, STAGE_REPORTED, err))
+    if (!write_report(s, err) || !session_store(s, STAGE_REPORTED, err))
         return false;
     report_as_text(s->facts, stdout);
     printf("\n%s/report.html\n", s->out);

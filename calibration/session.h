@@ -8,6 +8,7 @@
 #include "calibration/facts.h"
 #include "config/booth.h"
 #include "config/store.h"
+#include "render/material.h"
 
 struct session {
     struct bench bench;
@@ -56,6 +57,10 @@ struct vec3 session_eye(const struct session *s);
 // Aims the radiometer at the screen's centre: from the eye when the display's
 // light by direction is known, else along the normal.
 bool session_aim(struct session *s, struct vec3 eye, struct error *err);
+
+// Notes where everything stands, as the daemon believes it, and what the chart
+// is made of.
+bool session_place(struct session *s, const struct material *chart, struct error *err);
 
 // Shows each patch of the chart at the screen's centre under lamp i, measures
 // it and its reference, and captures the whole chart as PNG.

@@ -19,6 +19,9 @@ static bool save(struct measuring *m, struct session *s, const char *verify_path
     d->patches = m->fit.count;
     d->verified = m->verify.count;
     d->white_drift_percent = 100 * m->drift.white;
+    d->warm_up_s = m->warm_up_s;
+    d->warm_up_percent_h = 100 * m->warm_up_slope;
+    d->settle_s = m->settle.seconds;
     return patch_set_save(&m->fit, d->measurements, m->white, m->instrument, readings, err) &&
            patch_set_save(&m->verify, verify_path, m->white, m->instrument, readings, err);
 }

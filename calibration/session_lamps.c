@@ -21,6 +21,8 @@ static void report(struct lamp_report *lamp, const struct teaching *t, int readi
     lamp->map_scale = t->map_scale;
     lamp->spots = t->spots.count;
     memcpy(lamp->spot_ratios, t->spots.ratios, sizeof lamp->spot_ratios);
+    memcpy(lamp->spot_x_m, t->spots.x_m, sizeof lamp->spot_x_m);
+    memcpy(lamp->spot_z_m, t->spots.z_m, sizeof lamp->spot_z_m);
 }
 
 bool session_teach(struct session *s, int index, struct error *err)
@@ -35,5 +37,6 @@ bool session_teach(struct session *s, int index, struct error *err)
     if (!teach_lamp(&s->bench, &s->settings, lamp->name, map, &plan, &teaching, err))
         return false;
     report(lamp, &teaching, plan.readings);
+    memcpy(lamp->map, map, sizeof lamp->map);
     return true;
 }

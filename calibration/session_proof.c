@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "base/clock.h"
@@ -10,42 +11,35 @@
 #include "config/bands_file.h"
 #include "config/materials.h"
 
-enum { SETTLE_ATTEMPTS = 60, LOOKS = 5 };
+enum { SETTLE_ATTEMPTS = 60, LOOKS = 5, REPEATS = 5 };
+static const double SUSPECT_DE00 = 2; // a good display model is never so far off
 static const double STILL_DEG = 0.1, STILL_M = 0.015; // twice what noise moves them between looks
 static const double ASKED_DEG = 3; // a person sets no tilt better
 static const double POSE_TILTS_DEG[] = {20, 45, 60};
 static const double AXIS_DEG[] = {0, 15, 25}, AXIS_TILT_DEG = 60, AXIS_DISTANCE_M = 0.7;
 static const struct vec3 POSE_EYES[] = {{-0.10, 0.55, 0.60}, {0.12, 0.50, 0.70}};
 
-// What the patches are without an emulated booth to ask: their spectra under
-// the lamp as taught, at the illuminance that the reference integrates.
-static bool predicted(struct session *s, const struct lamp_report *lamp,
-                      const struct spectrum *reflectances, int count, struct xyz *out,
-                      struct error *err)
+// What a sample would send by the taught spectrum at that illuminance.
+static struct xyz expected(const struct lamp_report *lamp, const struct spectrum *reflectance,
+                           double lux)
 {
-    json_t *reply = control_call(s->bench.daemon,
-                                 json_pack("{ss,si,si}", "do", CONTROL_PROBE, "x_px",
-                                           s->settings.screen.width_px / 2, "y_px",
-                                           s->settings.screen.height_px / 2),
-                                 60000, err);
-    if (!reply)
-        return false;
-    double lux = json_number_value(json_object_get(reply, "lux"));
-    json_decref(reply);
-    for (int i = 0; i < count; i++) {
-        struct xyz c = xyz_relative(&lamp->irradiance, &reflectances[i], OBSERVER_1931_2);
-        double k = lux / 100 / acos(-1);
-        out[i] = (struct xyz){k * c.X, k * c.Y, k * c.Z};
-    }
-    return true;
+    struct xyz c = xyz_relative(&lamp->irradiance, reflectance, OBSERVER_1931_2);
+    double k = lux / 100 / acos(-1);
+    return (struct xyz){k * c.X, k * c.Y, k * c.Z};
 }
 
-static bool references(struct session *s, const struct lamp_report *lamp,
-                       const struct spectrum *reflectances, int count, struct xyz *out,
-                       struct error *err)
+static bool probe(struct session *s, struct proofed_pixel *out, struct error *err)
 {
-    return s->bench.booth ? bench_truth(&s->bench, reflectances, count, out, err)
-                          : predicted(s, lamp, reflectances, count, out, err);
+    return bench_pixel(&s->bench, s->settings.screen.width_px / 2,
+                       s->settings.screen.height_px / 2, out, err);
+}
+
+// The emulated booth knows; elsewhere it is what is expected.
+static bool reference(struct session *s, const struct spectrum *reflectance, struct xyz expectation,
+                      struct xyz *out, struct error *err)
+{
+    *out = expectation;
+    return !s->bench.booth || bench_truth(&s->bench, reflectance, 1, out, err);
 }
 
 static bool simulate(struct lamp_report *lamp, const struct material *chart, const char *bands,
@@ -74,34 +68,120 @@ static int lightest(const struct lamp_report *lamp)
     return best;
 }
 
+static int by_luminance(const void *a, const void *b)
+{
+    double x = ((const struct xyz *)a)->Y, y = ((const struct xyz *)b)->Y;
+    return (x > y) - (x < y);
+}
+
+// A reading so far from what the models say is taken twice more, and the middle
+// one counts: instruments misread.
+static bool measure_patch(struct session *s, const char *what, const struct lamp_report *lamp,
+                          struct patch_report *p, struct error *err)
+{
+    struct xyz read[3];
+    struct lab a, b;
+    if (!bench_measure(&s->bench, what, &read[0], &p->reading, err))
+        return false;
+    p->measured = read[0];
+    if (!lab_of(read[0], lamp->white_reference, &a, err) ||
+        !lab_of(p->predicted, lamp->white_reference, &b, err))
+        return false;
+    if (delta_e_2000(a, b) < SUSPECT_DE00)
+        return true;
+    for (int i = 1; i < 3; i++)
+        if (!bench_measure(&s->bench, what, &read[i], NULL, err))
+            return false;
+    qsort(read, 3, sizeof *read, by_luminance);
+    p->measured = read[1];
+    return true;
+}
+
 // Reference and reading of a patch are taken together, since lamps drift.
 static bool measure_patches(struct session *s, struct lamp_report *lamp,
                             const struct material *chart, struct error *err)
 {
     struct bench *b = &s->bench;
-    int x = s->settings.screen.width_px / 2, y = s->settings.screen.height_px / 2;
     for (int i = 0; i < lamp->patch_count; i++) {
         struct patch_report *p = &lamp->patches[i];
+        struct proofed_pixel pixel;
         char what[160];
         snprintf(what, sizeof what, "%s under %s", p->name, lamp->name);
-        if (!bench_show(b, s->material, p->name, err) || !bench_in_gamut(b, x, y, &p->in_gamut, err) ||
-            !references(s, lamp, &chart->palette[i], 1, &p->reference, err) ||
-            !bench_measure(b, what, &p->measured, &p->reading, err))
+        if (!bench_show(b, s->material, p->name, err) || !probe(s, &pixel, err))
+            return false;
+        p->in_gamut = pixel.in_gamut;
+        p->aimed = pixel.surface;
+        p->predicted = pixel.sent;
+        p->counts = pixel.counts;
+        p->expected = expected(lamp, &chart->palette[i], pixel.lux);
+        if (!reference(s, &chart->palette[i], p->expected, &p->reference, err) ||
+            !measure_patch(s, what, lamp, p, err))
             return false;
         bench_progress(b, lamp->name, i + 1, lamp->patch_count);
     }
     return true;
 }
 
-static bool measure_white(struct session *s, const struct lamp_report *lamp, struct xyz *reference,
-                          struct xyz *measured, struct error *err)
+// repeats: all readings of it, count <= REPEATS; the middle one is *measured.
+static bool measure_white(struct session *s, const struct lamp_report *lamp, struct xyz *repeats,
+                          int count, struct xyz *reference_white, struct xyz *measured,
+                          struct error *err)
 {
     struct spectrum diffuser;
+    struct proofed_pixel pixel;
+    struct xyz sorted[REPEATS];
     for (int i = 0; i < SPECTRUM_COUNT; i++)
         diffuser.v[i] = 1;
-    return bench_show(&s->bench, "white", NULL, err) &&
-           references(s, lamp, &diffuser, 1, reference, err) &&
-           bench_measure(&s->bench, "perfect diffuser", measured, NULL, err);
+    if (!bench_show(&s->bench, "white", NULL, err) || !probe(s, &pixel, err) ||
+        !reference(s, &diffuser, expected(lamp, &diffuser, pixel.lux), reference_white, err))
+        return false;
+    for (int i = 0; i < count; i++)
+        if (!bench_measure(&s->bench, "perfect diffuser", &repeats[i], NULL, err))
+            return false;
+    memcpy(sorted, repeats, (size_t)count * sizeof *sorted);
+    qsort(sorted, (size_t)count, sizeof *sorted, by_luminance);
+    *measured = sorted[count / 2];
+    return true;
+}
+
+static void take_repeats(const struct xyz *read, int count, struct lamp_report *lamp)
+{
+    double level[REPEATS], red[REPEATS], blue[REPEATS];
+    for (int i = 0; i < count; i++) {
+        level[i] = read[i].Y;
+        red[i] = read[i].X / read[i].Y;
+        blue[i] = read[i].Z / read[i].Y;
+    }
+    struct summary y = summarise(level, count), r = summarise(red, count),
+                   b = summarise(blue, count);
+    lamp->repeats = count;
+    lamp->repeat_level = y.std / y.mean;
+    lamp->repeat_colour = hypot(r.std / r.mean, b.std / b.mean) / sqrt(2);
+}
+
+static bool measure_whites(struct session *s, struct lamp_report *lamp, struct error *err)
+{
+    struct xyz read[REPEATS];
+    struct proofed_pixel pixel;
+    if (!measure_white(s, lamp, read, REPEATS, &lamp->white_reference, &lamp->white_measured,
+                       err) ||
+        !probe(s, &pixel, err))
+        return false;
+    lamp->proof_lux = pixel.lux;
+    memcpy(lamp->gains, pixel.gains, sizeof lamp->gains);
+    take_repeats(read, REPEATS, lamp);
+    return bench_patch(&s->bench, (struct counts){0, 0, 0}, err) &&
+           bench_measure(&s->bench, "black", &lamp->black_shown, NULL, err);
+}
+
+static bool measure_drift(struct session *s, struct lamp_report *lamp, struct error *err)
+{
+    struct xyz read, reference_white, measured;
+    if (!measure_white(s, lamp, &read, 1, &reference_white, &measured, err))
+        return false;
+    double before = lamp->white_measured.Y / lamp->white_reference.Y;
+    lamp->chart_drift_percent = 100 * (measured.Y / reference_white.Y / before - 1);
+    return true;
 }
 
 static bool take_names(struct lamp_report *lamp, const struct material *chart, struct error *err)
@@ -131,8 +211,8 @@ static bool proof_chart(struct session *s, struct lamp_report *lamp, const struc
     if (!take_names(lamp, chart, err) || !simulate(lamp, chart, s->settings.quality.bands, err))
         return false;
     lamp->white_patch = lightest(lamp);
-    return measure_white(s, lamp, &lamp->white_reference, &lamp->white_measured, err) &&
-           measure_patches(s, lamp, chart, err) && picture(s, lamp, err) && proof_judge(lamp, err);
+    return measure_whites(s, lamp, err) && measure_patches(s, lamp, chart, err) &&
+           measure_drift(s, lamp, err) && picture(s, lamp, err) && proof_judge(lamp, err);
 }
 
 bool session_proof(struct session *s, int index, struct error *err)
@@ -145,7 +225,7 @@ bool session_proof(struct session *s, int index, struct error *err)
     struct material chart = {0};
     if (!material_load(&s->settings, s->material, &chart, err))
         return false;
-    bool fine = proof_chart(s, lamp, &chart, err);
+    bool fine = session_place(s, &chart, err) && proof_chart(s, lamp, &chart, err);
     material_fini(&chart);
     return fine || while_doing(err, "lamp %s", lamp->name);
 }
@@ -192,9 +272,10 @@ static bool settle(struct session *s, struct pose_report *pose, struct error *er
 static bool white_again(struct session *s, struct pose_report *pose, struct error *err)
 {
     const struct lamp_report *lamp = &s->facts->lamps[s->facts->lamp_count - 1];
+    struct xyz read;
     pose->moved_screen = true;
     if (!settle(s, pose, err) || !session_aim(s, pose->eye, err) ||
-        !measure_white(s, lamp, &pose->reference, &pose->measured, err))
+        !measure_white(s, lamp, &read, 1, &pose->reference, &pose->measured, err))
         return false;
     if (!(pose->reference.Y > 0))
         return fail(err, ERROR_DATA, "tilt %.0f: the reference is dark", pose->tilt_deg);

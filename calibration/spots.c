@@ -93,6 +93,8 @@ static bool measure_spots(struct bench *b, const char *lamp, const struct spot *
             continue;
         if (measure_spot(b, lamp, &places[i], &cdm2, err)) {
             out->ratios[out->count] = cdm2 / places[i].map_cdm2;
+            out->x_m[out->count] = places[i].x_m;
+            out->z_m[out->count] = places[i].z_m;
             taken[out->count++] = places[i];
         } else if (err->code == ERROR_RANGE) {
             limit = STEP_DOWN * places[i].map_cdm2;

@@ -12,6 +12,7 @@ struct spot_scale {
     double scale;              // median of the ratios
     int count;                 // 1..SPOTS_MOST
     double ratios[SPOTS_MOST]; // reading over map
+    double x_m[SPOTS_MOST], z_m[SPOTS_MOST]; // where, booth frame
 };
 
 // Aims the radiometer at even places of the map, from the brightest down, and

@@ -7,6 +7,11 @@
 
 #include "colorimetry/colour.h"
 
+// What the plots expect of the style of the page they stand in.
+#define SVG_STYLE                                                                                  \
+    "svg .grid{stroke:#e7e5e4}svg .locus{fill:#f5f5f4;stroke:#a8a29e}"                             \
+    "svg .small{font-size:8.5px}svg text{fill:#44403c}"
+
 struct svg_series {
     const char *name, *colour; // colour: CSS
     int count;

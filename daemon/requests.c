@@ -86,6 +86,10 @@ static void probe(struct booth *b, struct job *job)
         p.surface.X, p.surface.Y, p.surface.Z, "emitted", p.emitted.X, p.emitted.Y, p.emitted.Z,
         "rgb", p.inverse.counts.r, p.inverse.counts.g, p.inverse.counts.b, "linear",
         p.inverse.linear.r, p.inverse.linear.g, p.inverse.linear.b, "in_gamut", p.inverse.in_gamut);
+    json_object_set_new(job->reply, "sent", json_pack("[f,f,f]", p.sent.X, p.sent.Y, p.sent.Z));
+    json_object_set_new(job->reply, "gains",
+                        json_pack("[f,f,f,f]", p.gains.c[0], p.gains.c[1], p.gains.c[2],
+                                  p.gains.c[3]));
 }
 
 // Settings that were given away at the start.

@@ -55,6 +55,9 @@ struct pixel {
     struct xyz emitted; // surface less the screen's own reflection
     struct xyz asked;   // of the display model, so that emitted leaves towards the eye
     struct display_inverse inverse;
+    struct view_gains gains; // of the display there
+    struct xyz sent; // cd/m2 that then reaches the eye, by the models: counts clamped and, unless
+                     // dithered, rounded; with the screen's own reflection
 };
 
 // Gains of the display at a pixel for the scene's eye; all 1 without a view.

@@ -63,6 +63,25 @@ static void a_dimmed_lamp_dims_everything_by_the_same_share(void **state)
     surface_fini(&s);
 }
 
+// In gamut the models give back what was wanted, to half a code.
+static void what_is_sent_is_the_surface_within_a_code(void **state)
+{
+    (void)state;
+    struct surface s;
+    surface_init(&s);
+    s.scene.dither = true;
+    struct pixel exact = reference_pixel(&s.scene, 80, 50);
+    assert_true(exact.inverse.in_gamut);
+    assert_relative(exact.sent.X, exact.surface.X, 1e-6);
+    assert_relative(exact.sent.Y, exact.surface.Y, 1e-6);
+    assert_relative(exact.sent.Z, exact.surface.Z, 1e-6);
+    s.scene.dither = false;
+    struct pixel rounded = reference_pixel(&s.scene, 80, 50);
+    assert_relative(rounded.sent.Y, exact.surface.Y, 0.02); // a code of 8 bits at gamma 2.2
+    assert_true(rounded.sent.Y != exact.sent.Y);
+    surface_fini(&s);
+}
+
 static void outside_the_material_it_is_black_and_in_gamut(void **state)
 {
     (void)state;
@@ -113,6 +132,7 @@ int main(void)
         cmocka_unit_test(one_light_straight_above_gives_what_the_hand_computes),
         cmocka_unit_test(counts_sent_through_the_display_give_the_wanted_light),
         cmocka_unit_test(a_dimmed_lamp_dims_everything_by_the_same_share),
+        cmocka_unit_test(what_is_sent_is_the_surface_within_a_code),
         cmocka_unit_test(outside_the_material_it_is_black_and_in_gamut),
         cmocka_unit_test(the_first_texel_is_at_the_top_left),
         cmocka_unit_test(darker_than_the_screens_own_reflection_is_flagged),
