@@ -13,6 +13,8 @@ static const struct command FAMILIES[] = {
     {"light", command_light, "teach|map|points|list", "the lamps of the booth and their luminance maps"},
     {"session", command_session, "--config FILE --maps FOLDER -o FOLDER",
      "from bare settings to an accuracy report"},
+    {"verify", command_verify, "--config FILE [--published-mean T] ...",
+     "whether the proof keeps to tolerances under the lamp that is on"},
     {"report", command_report, "FOLDER | --check FILE...",
      "a session's facts made into a sealed report with uncertainties"},
     {"spectrometer", command_spectrometer, "dark|wavelength|linearity|raw",

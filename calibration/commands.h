@@ -50,6 +50,7 @@ int command_tilt(int argc, char **argv);
 int command_tracker(int argc, char **argv);
 int command_keep(int argc, char **argv);
 int command_report(int argc, char **argv);
+int command_verify(int argc, char **argv);
 int command_history(int argc, char **argv);
 int command_diff(int argc, char **argv);
 int command_use(int argc, char **argv);

@@ -35,7 +35,7 @@ static void note_input(struct report *r, const char *path)
 static void note_beside(struct report *r, const char *folder, const char *name)
 {
     char path[512];
-    if (snprintf(path, sizeof path, "%s/%s", folder, name) < (int)sizeof path)
+    if (*folder && snprintf(path, sizeof path, "%s/%s", folder, name) < (int)sizeof path)
         note_input(r, path);
 }
 

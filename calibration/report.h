@@ -62,7 +62,7 @@ struct report {
     char missing[REPORT_MISSING][512];
 };
 
-// folder: of the session, whose session.json is listed among the inputs. Model,
+// folder: of the session, whose session.json is listed among the inputs; "" = none. Model,
 // maps, measurements and pictures that are no longer where the facts say are
 // missing, and what needs them is not computed. Errors: a facts file that
 // cannot be read; the settings of uncertainties.

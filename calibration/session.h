@@ -62,8 +62,12 @@ bool session_aim(struct session *s, struct vec3 eye, struct error *err);
 // is made of.
 bool session_place(struct session *s, const struct material *chart, struct error *err);
 
-// Shows each patch of the chart at the screen's centre under lamp i, measures
-// it and its reference, and captures the whole chart as PNG.
+// Shows each patch of the chart at the screen's centre, under the light that is
+// on and is taken for lamp i, measures it and its reference, and captures the
+// whole chart as PNG where the session has a folder for results.
+bool session_chart(struct session *s, int lamp, struct error *err);
+
+// Switches to lamp i, waits until the daemon knows it, and shows the chart.
 bool session_proof(struct session *s, int lamp, struct error *err);
 
 // Tilts the screen and moves the head under the last lamp; white again, and

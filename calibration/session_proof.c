@@ -199,6 +199,8 @@ static bool take_names(struct lamp_report *lamp, const struct material *chart, s
 static bool picture(struct session *s, struct lamp_report *lamp, struct error *err)
 {
     char path[sizeof lamp->picture];
+    if (!*s->out)
+        return true;
     snprintf(path, sizeof path, "%s/chart-%s.png", s->out, lamp->name);
     memcpy(lamp->picture, path, sizeof path);
     return bench_show(&s->bench, s->material, NULL, err) &&
@@ -215,19 +217,24 @@ static bool proof_chart(struct session *s, struct lamp_report *lamp, const struc
            measure_drift(s, lamp, err) && picture(s, lamp, err) && proof_judge(lamp, err);
 }
 
+bool session_chart(struct session *s, int index, struct error *err)
+{
+    struct material chart = {0};
+    if (!session_aim(s, session_eye(s), err) ||
+        !material_load(&s->settings, s->material, &chart, err))
+        return false;
+    bool fine = session_place(s, &chart, err) &&
+                proof_chart(s, &s->facts->lamps[index], &chart, err);
+    material_fini(&chart);
+    return fine;
+}
+
 bool session_proof(struct session *s, int index, struct error *err)
 {
-    struct lamp_report *lamp = &s->facts->lamps[index];
-    struct bench *b = &s->bench;
-    if (!bench_lamp(b, lamp->name, err) || !bench_await_lamp(b, lamp->name, 30, err) ||
-        !session_aim(s, session_eye(s), err))
-        return false;
-    struct material chart = {0};
-    if (!material_load(&s->settings, s->material, &chart, err))
-        return false;
-    bool fine = session_place(s, &chart, err) && proof_chart(s, lamp, &chart, err);
-    material_fini(&chart);
-    return fine || while_doing(err, "lamp %s", lamp->name);
+    const struct lamp_report *lamp = &s->facts->lamps[index];
+    return (bench_lamp(&s->bench, lamp->name, err) &&
+            bench_await_lamp(&s->bench, lamp->name, 30, err) && session_chart(s, index, err)) ||
+           while_doing(err, "lamp %s", lamp->name);
 }
 
 // One look at the daemon's belief: tilt, and the eye added to *eyes.

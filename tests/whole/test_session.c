@@ -187,14 +187,30 @@ static void the_results_are_a_sound_calibration_in_the_store(void **state)
     store_version_fini(&v);
 }
 
+// demo.sh asks for a mean of 2 and a maximum of 5 under the last lamp.
+static void the_verification_after_it_passes_or_is_undecided(void **state)
+{
+    (void)state;
+    char path[128];
+    snprintf(path, sizeof path, "%s/verify.json", folder);
+    json_t *verify = json_load_file(path, 0, NULL);
+    assert_non_null(verify);
+    const char *verdict = json_string_value(json_object_get(verify, "verdict"));
+    assert_true(!strcmp(verdict, "pass") || !strcmp(verdict, "undecided"));
+    assert_int_equal(json_array_size(json_object_get(verify, "patches")), 4);
+    assert_string_equal(json_string_value(json_object_get(verify, "lamp")), "D65");
+    json_decref(verify);
+}
+
 static void every_form_of_the_report_is_sealed(void **state)
 {
     (void)state;
     char line[512];
     const char *build = getenv("BUILD");
     snprintf(line, sizeof line,
-             "%s/boothcal report --check %s/report.json %s/report.txt %s/report.html %s/report.pdf",
-             build ? build : "build", folder, folder, folder, folder);
+             "%s/boothcal report --check %s/report.json %s/report.txt %s/report.html %s/report.pdf "
+             "%s/verify.json",
+             build ? build : "build", folder, folder, folder, folder, folder);
     assert_int_equal(system(line), 0);
 }
 
@@ -228,6 +244,7 @@ int main(void)
         cmocka_unit_test(tilt_and_eye_are_seen_where_they_are),
         cmocka_unit_test(every_reading_is_kept_and_labelled_as_emulated),
         cmocka_unit_test(the_files_of_the_session_are_there),
+        cmocka_unit_test(the_verification_after_it_passes_or_is_undecided),
         cmocka_unit_test(every_form_of_the_report_is_sealed),
         cmocka_unit_test(every_difference_has_its_uncertainty_and_the_causes_their_shares),
         cmocka_unit_test(the_results_are_a_sound_calibration_in_the_store),
