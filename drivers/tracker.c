@@ -48,8 +48,11 @@ const struct setting tracker_settings[] = {
      .help = "opentrack: UDP port to listen at."},
     {"origin_m", SETTING_VECTOR, FIELD(origin_m), 3, -5, 5, .unit = "m", .preset = "0 0 0",
      .help = "opentrack: where its zero lies from the camera: observer's right, up, away from it."},
-    {"signs", SETTING_VECTOR, FIELD(signs), 6, -1, 1, .unit = "", .preset = "1 1 1 1 1 1",
-     .help = "opentrack: factors of x, y, z, yaw, pitch and roll; 0 leaves one out."},
+    {"signs", SETTING_VECTOR, FIELD(signs), 6, -1, 1, .unit = "", .preset = "-1 1 1 -1 1 1",
+     .help =
+         "opentrack: factors of x, y, z, yaw, pitch and roll; 0 leaves one out. The preset fits "
+         "a camera's picture as it is; a mirrored one needs 1 1 1 1 1 -1. For an axis that is "
+         "inverted in opentrack take the opposite."},
     {0},
 };
 

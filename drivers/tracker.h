@@ -42,7 +42,7 @@ struct tracker_options {
     char address[64];   // numeric IPv4 address to listen at
     int port;           // UDP, 1..65535; 0 = any free one
     double origin_m[3]; // of opentrack's zero, tracker frame, -5..5
-    double signs[6];    // factors of x, y, z, yaw, pitch, roll, -1..1
+    double signs[6];    // of x, y, z, yaw, pitch, roll, -1..1; 1 as in opentrack.md (-1 1 1 -1 1 1)
 };
 
 extern const struct setting tracker_settings[];

@@ -32,6 +32,15 @@ static struct tracker_options preset(void)
     return options;
 }
 
+// Those whose directions opentrack.md gives, without signs.
+static struct tracker_options unsigned_preset(void)
+{
+    struct tracker_options options = preset();
+    for (int i = 0; i < OPENTRACK_AXES; i++)
+        options.signs[i] = 1;
+    return options;
+}
+
 static void pack(const double pose[6], uint8_t bytes[48])
 {
     for (int i = 0; i < 6; i++) {
@@ -108,7 +117,7 @@ static void what_is_no_number_or_out_of_range_is_refused(void **state)
 static void a_head_at_rest_is_where_it_says(void **state)
 {
     (void)state;
-    struct tracker_options o = preset();
+    struct tracker_options o = unsigned_preset();
     struct vec3 eye = opentrack_eye(&o, (const double[]){3, -4, 60, 0, 0, 0});
     assert_near(eye.x, 0.03, arithmetic);
     assert_near(eye.y, -0.04, arithmetic);
@@ -118,7 +127,7 @@ static void a_head_at_rest_is_where_it_says(void **state)
 static void turns_carry_the_eye_left_up_and_over(void **state)
 {
     (void)state;
-    struct tracker_options o = preset();
+    struct tracker_options o = unsigned_preset();
     o.eye_from_marker_m[2] = -0.1; // in front of the tracked point
     struct vec3 left = opentrack_eye(&o, (const double[]){0, 0, 0, 30, 0, 0});
     assert_near(left.x, -0.05, arithmetic);
@@ -133,7 +142,7 @@ static void turns_carry_the_eye_left_up_and_over(void **state)
 static void origin_and_signs_are_the_users(void **state)
 {
     (void)state;
-    struct tracker_options o = preset();
+    struct tracker_options o = unsigned_preset();
     o.origin_m[2] = 0.7;
     o.signs[0] = -1;
     o.signs[3] = 0;
@@ -141,6 +150,45 @@ static void origin_and_signs_are_the_users(void **state)
     struct vec3 eye = opentrack_eye(&o, (const double[]){5, 0, 0, 90, 0, 0});
     assert_near(eye.x, -0.05, arithmetic);
     assert_near(eye.z, 0.6, arithmetic);
+}
+
+// What its own trackers send of a head, as their sources' formulas have it, from
+// a camera's picture as it is and from a mirrored one.
+static void the_preset_is_for_a_plain_picture(void **state)
+{
+    (void)state;
+    const double head[OPENTRACK_AXES] = {11, -7, 60, 25, 10, 15};
+    const double mirrored[OPENTRACK_AXES] = {11, -7, 60, 25, 10, -15};
+    const double plain[OPENTRACK_AXES] = {-11, -7, 60, -25, 10, 15};
+    struct tracker_options as_meant = unsigned_preset(), of_mirror = preset(), by_preset = preset();
+    as_meant.eye_from_marker_m[0] = of_mirror.eye_from_marker_m[0] = 0.03;
+    as_meant.eye_from_marker_m[1] = of_mirror.eye_from_marker_m[1] = -0.05;
+    as_meant.eye_from_marker_m[2] = of_mirror.eye_from_marker_m[2] = -0.1;
+    memcpy(by_preset.eye_from_marker_m, as_meant.eye_from_marker_m,
+           sizeof as_meant.eye_from_marker_m);
+    memcpy(of_mirror.signs, (const double[]){1, 1, 1, 1, 1, -1}, sizeof of_mirror.signs);
+    struct vec3 eye = opentrack_eye(&as_meant, head);
+    struct vec3 one = opentrack_eye(&by_preset, plain), other = opentrack_eye(&of_mirror, mirrored);
+    assert_near(one.x, eye.x, arithmetic);
+    assert_near(one.y, eye.y, arithmetic);
+    assert_near(one.z, eye.z, arithmetic);
+    assert_near(other.x, eye.x, arithmetic);
+    assert_near(other.y, eye.y, arithmetic);
+    assert_near(other.z, eye.z, arithmetic);
+}
+
+static void a_mirror_only_swaps_left_and_right(void **state)
+{
+    (void)state;
+    const double plain[OPENTRACK_AXES] = {-11, -7, 60, -25, 10, 15};
+    const double turned_round[OPENTRACK_AXES] = {11, -7, 60, 25, 10, -15};
+    struct tracker_options o = preset();
+    o.eye_from_marker_m[1] = -0.05;
+    o.eye_from_marker_m[2] = -0.1;
+    struct vec3 eye = opentrack_eye(&o, plain), seen = opentrack_eye(&o, turned_round);
+    assert_near(seen.x, -eye.x, arithmetic);
+    assert_near(seen.y, eye.y, arithmetic);
+    assert_near(seen.z, eye.z, arithmetic);
 }
 
 // The driver at a free port, and a sender connected to it.
@@ -151,7 +199,7 @@ struct link {
 
 static void link_open(struct link *l)
 {
-    struct tracker_options o = preset();
+    struct tracker_options o = unsigned_preset();
     struct instrument_identity who;
     struct error err = {0};
     o.port = 0;
@@ -289,6 +337,8 @@ int main(void)
         cmocka_unit_test(a_head_at_rest_is_where_it_says),
         cmocka_unit_test(turns_carry_the_eye_left_up_and_over),
         cmocka_unit_test(origin_and_signs_are_the_users),
+        cmocka_unit_test(the_preset_is_for_a_plain_picture),
+        cmocka_unit_test(a_mirror_only_swaps_left_and_right),
         cmocka_unit_test(of_many_datagrams_the_last_counts),
         cmocka_unit_test(garbage_between_poses_is_passed_over),
         cmocka_unit_test(garbage_alone_is_named_and_leaves_the_sample),

@@ -28,13 +28,14 @@ static int free_port(void)
     return ntohs(at.sin_port);
 }
 
+// signs = more of boothd's arguments; "" leaves them at their preset.
 static int open_with(const char *mirrored, const char *signs)
 {
     char scenario[64], arguments[256];
     int port = free_port();
     snprintf(scenario, sizeof scenario, "[opentrack]\nport = %d\nmirrored = %s\n", port, mirrored);
     snprintf(arguments, sizeof arguments,
-             "--set tracker.driver=opentrack --set tracker.port=%d --set tracker.signs='%s'"
+             "--set tracker.driver=opentrack --set tracker.port=%d %s"
              " --set radiometer.driver=none --set display.output=offscreen",
              port, signs);
     if (!booth_open(&here, scenario, arguments))
@@ -47,13 +48,13 @@ static int open_with(const char *mirrored, const char *signs)
 static int open_mirrored(void **state)
 {
     (void)state;
-    return open_with("yes", "1 1 1 1 1 -1");
+    return open_with("yes", "--set tracker.signs='1 1 1 1 1 -1'");
 }
 
 static int open_plain(void **state)
 {
     (void)state;
-    return open_with("no", "-1 1 1 -1 1 1");
+    return open_with("no", "");
 }
 
 static int leave(void **state)
