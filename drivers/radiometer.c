@@ -9,6 +9,8 @@
 #define FIELD(name) SETTING_FIELD(struct radiometer_options, name)
 #define SIZE(name) SETTING_SIZE(struct radiometer_options, name)
 
+const char *const radiometer_spectral_names[] = {"auto", "yes", "no", NULL};
+
 const struct setting radiometer_settings[] = {
     {"port", SETTING_TEXT, FIELD(port), SIZE(port), .unit = "", .preset = "",
      .help = "Serial line of the spectroradiometer; empty when there is none."},
@@ -22,6 +24,10 @@ const struct setting radiometer_settings[] = {
     {"calibrate", SETTING_BOOL, FIELD(calibrate), .unit = "", .preset = "no",
      .help = "Driver spotread: let it calibrate when it asks at the start; the instrument must lie "
              "on its calibration position then."},
+    {"spectral", SETTING_ENUM, FIELD(spectral), .unit = "", .choices = radiometer_spectral_names,
+     .preset = "auto",
+     .help = "Driver spotread: ask for spectra: where the instrument has them (auto), always, or "
+             "never. A colorimeter has none; auto starts spotread twice to find out."},
     {0},
 };
 

@@ -17,6 +17,15 @@ struct radiance_sample {
 
 enum { RADIOMETER_AVERAGE_MOST = 99 };
 
+// Whether spectra are asked for: where the instrument has them, always (without
+// them it does not open), never. The names are in the same order.
+enum radiometer_spectral {
+    RADIOMETER_SPECTRAL_AUTO,
+    RADIOMETER_SPECTRAL_YES,
+    RADIOMETER_SPECTRAL_NO,
+};
+extern const char *const radiometer_spectral_names[]; // "auto", "yes", "no", NULL
+
 struct radiometer_options {
     char port[128]; // serial line, "" = none
     int average;    // readings per sample, 1..RADIOMETER_AVERAGE_MOST
@@ -24,6 +33,7 @@ struct radiometer_options {
     char program[128];   // name or path
     char arguments[256]; // more options, separated by blanks
     bool calibrate;      // the instrument lies on its calibration position when opened
+    int spectral;        // enum radiometer_spectral
 };
 
 extern const struct setting radiometer_settings[];

@@ -16,18 +16,22 @@ enum {
     ARGUMENTS_MOST = 32,
     VALUES_MOST = 401,
     QUIET_MS = 250, // after which a line without an end is all there is
+    MODEL_MOST = 50,
 };
 
 struct radiometer {
     struct radiometer_options options;
     struct child child;
-    bool ready; // it waits for a key; none was sent since
+    enum spotread_line waits; // READY, CALIBRATION, RETRY: for a key; none was sent since
+    bool opened;              // the instrument may be aimed at a light now
+    bool spectral;            // spectra are asked for
     char model[64], serial[64], firmware[64];
 };
 
-// One reading as it is put together.
+// One reading, or what was said until the first one, as it is put together.
 struct reading {
-    bool has_xyz, failed;
+    bool has_xyz, failed, no_spectra;
+    char last[160]; // line without a meaning to us
     struct xyz xyz;
     double first_nm, last_nm, values[VALUES_MOST];
     int wanted, got;
@@ -44,24 +48,61 @@ static bool begins(const char *text, const char *with)
     return !strncmp(text, with, strlen(with));
 }
 
+static bool has_any(const char *text, const char *const *words)
+{
+    for (; *words; words++)
+        if (strstr(text, *words))
+            return true;
+    return false;
+}
+
+// Warnings that it goes on after.
+static const char *const harmless[] = {"(ignored)", "ignored - instrument", "nitial calibrate",
+                                       "nitial-calibrate", NULL};
+
+static const char *const calibrations[] = {"calibration position", "reflective white reference",
+                                           "Sensor should be in", NULL};
+
+static const char *const failures[] = {"fail",
+                                       "Fail",
+                                       "Saturat",
+                                       "saturat",
+                                       "too low",
+                                       "stopped at",
+                                       "nrecognised",
+                                       "fatal error",
+                                       "No device",
+                                       "instrument detected",
+                                       "No instrument",
+                                       "doesn't support",
+                                       "Diagnostic:",
+                                       "Error -",
+                                       NULL};
+
+static const char *const too_bright[] = {"aturat",      "oo much light", "oo bright",  "too high",
+                                         "verexposure", "verrange",      "over range", NULL};
+
+static const char *const losses[] = {"ommunication",        "comms",     "nitialis",
+                                     "instrument detected", "No device", "No instrument",
+                                     "nrecognised",         NULL};
+
 enum spotread_line spotread_line(const char *text)
 {
-    static const char *const failures[] = {"fail",        "Fail",     "Saturat",
-                                           "saturat",     "too low",  "stopped at user",
-                                           "nrecognised", "No device"};
     text = skip_blanks(text);
     if (begins(text, "Result is XYZ:"))
         return SPOTREAD_XYZ;
     if (begins(text, "Spectrum from"))
         return SPOTREAD_SPECTRUM;
-    if (strstr(text, "calibration position") || strstr(text, "reflective white reference") ||
-        strstr(text, "Sensor should be in"))
+    if (has_any(text, calibrations))
         return SPOTREAD_CALIBRATION;
     if (strstr(text, "to take a reading"))
         return SPOTREAD_READY;
-    for (size_t i = 0; i < sizeof failures / sizeof *failures; i++)
-        if (strstr(text, failures[i]))
-            return SPOTREAD_FAILED;
+    if (strstr(text, "key to retry"))
+        return SPOTREAD_RETRY;
+    if (strstr(text, "Need spectral information"))
+        return SPOTREAD_NO_SPECTRA;
+    if (!has_any(text, harmless) && has_any(text, failures))
+        return SPOTREAD_FAILED;
     return SPOTREAD_OTHER;
 }
 
@@ -105,14 +146,14 @@ bool spotread_spectrum_values(const char *line, double *values, int most, int *g
 
 bool spotread_failure(const char *line, struct error *err)
 {
-    bool saturated = strstr(line, "aturat") != NULL;
-    bool lost = strstr(line, "ommunication") || strstr(line, "comms") ||
-                strstr(line, "nitialisation") || strstr(line, "No device") ||
-                strstr(line, "nrecognised");
+    if (spotread_line(line) == SPOTREAD_NO_SPECTRA)
+        return fail(err, ERROR_CONFIG,
+                    "spotread's instrument has no spectra: set spectral = auto or no, and no "
+                    "option that needs them");
     return fail(err,
-                saturated ? ERROR_RANGE
-                : lost    ? ERROR_GONE
-                          : ERROR_RETRY,
+                has_any(line, too_bright) ? ERROR_RANGE
+                : has_any(line, losses)   ? ERROR_GONE
+                                          : ERROR_RETRY,
                 "spotread: %s", skip_blanks(line));
 }
 
@@ -130,87 +171,131 @@ static void take_name(struct radiometer *r, const char *line)
     learn(r->firmware, sizeof r->firmware, line, "Firmware version:");
 }
 
+static void take_failure(const char *line, struct reading *g)
+{
+    if (!g->failed)
+        g->failed = !spotread_failure(line, &g->why);
+}
+
 static void take_line(struct radiometer *r, const char *line, struct reading *g)
 {
     enum spotread_line what = spotread_line(line);
+    bool blank = !*skip_blanks(line);
     if (what == SPOTREAD_XYZ)
         g->has_xyz = spotread_xyz(line, &g->xyz);
     else if (what == SPOTREAD_SPECTRUM &&
              !spotread_spectrum_head(line, &g->first_nm, &g->last_nm, &g->wanted))
         g->failed = !fail(&g->why, ERROR_DATA, "spotread: \"%.80s\"", line);
-    else if (what == SPOTREAD_FAILED && !g->failed)
-        g->failed = !spotread_failure(line, &g->why);
-    else if (what == SPOTREAD_OTHER && g->got < g->wanted && *skip_blanks(line) &&
+    else if (what == SPOTREAD_FAILED || what == SPOTREAD_NO_SPECTRA)
+        take_failure(line, g);
+    else if (what == SPOTREAD_OTHER && g->got < g->wanted && !blank &&
              !spotread_spectrum_values(line, g->values, g->wanted, &g->got))
         g->failed = !fail(&g->why, ERROR_DATA, "spotread: \"%.80s\" amidst the spectrum", line);
     else
         take_name(r, line);
+    g->no_spectra = g->no_spectra || what == SPOTREAD_NO_SPECTRA;
+    if (what == SPOTREAD_OTHER && !blank)
+        snprintf(g->last, sizeof g->last, "%.*s", (int)sizeof g->last - 1, skip_blanks(line));
 }
 
-static bool fail_calibration(struct radiometer *r, struct error *err)
+static bool fail_calibration(struct error *err)
 {
-    r->ready = false;
     return fail(err, ERROR_GONE,
                 "spotread asks for calibration: put the instrument on its calibration position and "
                 "set calibrate = yes, or calibrate with spotread itself first");
 }
 
-// Reads lines into g until spotread waits for a key: READY or CALIBRATION. Its
-// last line has no end, and differs between versions, so that a pause ends it.
-static bool await_prompt(struct radiometer *r, struct reading *g, enum spotread_line *what,
-                         int64_t deadline_ns, struct error *err)
+// The program ended, or its terminal makes no sense any more.
+static bool fail_ended(const struct reading *g, const struct error *why, struct error *err)
 {
-    bool prompted = false, calibration = false;
+    if (g->failed)
+        return fail(err, g->why.code == ERROR_CONFIG ? ERROR_CONFIG : ERROR_GONE, "%s",
+                    g->why.text);
+    return fail(err, ERROR_GONE, "%s%s%s", why->text, *g->last ? ": " : "", g->last);
+}
+
+// Reads lines into g until spotread waits for a key: READY, CALIBRATION or
+// RETRY. Its last line has no end, and differs between versions, so that a
+// pause ends the first two.
+static bool await_prompt(struct radiometer *r, struct reading *g, int64_t deadline_ns,
+                         struct error *err)
+{
+    enum spotread_line prompted = SPOTREAD_OTHER;
     for (;;) {
         char line[CHILD_LINE];
         bool whole;
-        int wait = prompted || calibration ? QUIET_MS : 1000;
         struct error why = {0};
-        if (!child_line(&r->child, line, sizeof line, wait, deadline_ns, &whole, &why)) {
+        if (!child_line(&r->child, line, sizeof line, prompted ? QUIET_MS : 1000, deadline_ns,
+                        &whole, &why)) {
             if (why.code != ERROR_RETRY)
-                return fail(err, ERROR_GONE, "%s", g->failed ? g->why.text : why.text);
-            *what = calibration ? SPOTREAD_CALIBRATION : SPOTREAD_READY;
-            if (prompted || calibration)
+                return fail_ended(g, &why, err);
+            r->waits = prompted;
+            if (prompted)
                 return true;
-            if (deadline_ms(deadline_ns, 1) <= 0)
-                return fail(err, ERROR_RETRY, "%s", why.text);
-            continue;
+        } else {
+            enum spotread_line is = spotread_line(line);
+            if (is == SPOTREAD_READY || is == SPOTREAD_RETRY) {
+                r->waits = is;
+                return true;
+            }
+            if (is == SPOTREAD_CALIBRATION)
+                prompted = is;
+            else if (!prompted && strstr(line, "Place instrument on spot"))
+                prompted = SPOTREAD_READY;
+            else if (whole && !prompted)
+                take_line(r, line, g);
         }
-        enum spotread_line is = spotread_line(line);
-        calibration = calibration || is == SPOTREAD_CALIBRATION;
-        prompted = prompted || strstr(line, "Place instrument on spot") != NULL;
-        if (is == SPOTREAD_READY) {
-            *what = SPOTREAD_READY;
-            return true;
-        }
-        if (whole && !prompted)
-            take_line(r, line, g);
+        if (deadline_ms(deadline_ns, 1) <= 0)
+            return fail(err, ERROR_RETRY, "%s",
+                        g->failed  ? g->why.text
+                        : why.code ? why.text
+                                   : "spotread does not come to an end");
     }
 }
 
 static bool press(struct radiometer *r, int64_t deadline_ns, struct error *err)
 {
-    r->ready = false;
-    child_forget(&r->child); // the prompt that is answered now
-    return child_write(&r->child, KEY_READ, deadline_ns, err);
+    if (!child_write(&r->child, KEY_READ, deadline_ns, err))
+        return false;
+    child_forget(&r->child); // the prompt that was answered
+    r->waits = SPOTREAD_OTHER;
+    return true;
 }
 
-// Until the first prompt; *g is what it said on the way.
-static bool get_ready(struct radiometer *r, int64_t deadline_ns, struct error *err)
+// After a reading that failed any key brings the usual prompt back. A lost
+// instrument stays lost to this process, and a calibration that failed would
+// fail again: those end it.
+static bool answer_retry(struct radiometer *r, struct reading *g, int64_t deadline_ns,
+                         struct error *err)
 {
-    struct reading g = {0};
-    enum spotread_line what;
-    for (int tries = 0;; tries++) {
-        if (!await_prompt(r, &g, &what, deadline_ns, err))
+    if (!g->failed)
+        g->failed =
+            !fail(&g->why, ERROR_RETRY, "spotread: %s", *g->last ? g->last : "no reason given");
+    if (!r->opened || g->why.code == ERROR_GONE)
+        return fail(err, ERROR_GONE, "%s", g->why.text);
+    return press(r, deadline_ns, err);
+}
+
+// Until it waits for a key to read. At the start it may calibrate; later the
+// instrument looks at a light.
+static bool get_ready(struct radiometer *r, struct reading *g, int64_t deadline_ns,
+                      struct error *err)
+{
+    bool calibrated = !r->options.calibrate || r->opened;
+    while (r->waits != SPOTREAD_READY) {
+        if (r->waits == SPOTREAD_CALIBRATION) {
+            if (calibrated)
+                return fail_calibration(err);
+            if (!press(r, deadline_ns, err))
+                return false;
+            calibrated = true;
+        } else if (r->waits == SPOTREAD_RETRY) {
+            if (!answer_retry(r, g, deadline_ns, err))
+                return false;
+        } else if (!await_prompt(r, g, deadline_ns, err)) {
             return while_doing(err, "waiting for spotread");
-        if (what == SPOTREAD_READY)
-            break;
-        if (!r->options.calibrate || tries > 0)
-            return fail_calibration(r, err);
-        if (!press(r, deadline_ns, err))
-            return false;
+        }
     }
-    r->ready = true;
     return true;
 }
 
@@ -230,17 +315,18 @@ static bool complete(const struct reading *g, struct error *err)
 static bool read_once(struct radiometer *r, struct reading *g, struct interval *taken,
                       int64_t deadline_ns, struct error *err)
 {
-    enum spotread_line what;
     *g = (struct reading){0};
-    if (!r->ready && !get_ready(r, deadline_ns, err))
+    if (!get_ready(r, g, deadline_ns, err))
         return false;
+    *g = (struct reading){0}; // without what an earlier reading left
     taken->earliest_ns = clock_now_ns();
-    if (!press(r, deadline_ns, err) || !await_prompt(r, g, &what, deadline_ns, err))
+    if (!press(r, deadline_ns, err) || !await_prompt(r, g, deadline_ns, err))
         return while_doing(err, "waiting for a reading");
     taken->latest_ns = clock_now_ns();
-    if (what == SPOTREAD_CALIBRATION)
-        return fail_calibration(r, err);
-    r->ready = true;
+    if (r->waits == SPOTREAD_CALIBRATION)
+        return fail_calibration(err);
+    if (r->waits == SPOTREAD_RETRY && !answer_retry(r, g, deadline_ns, err))
+        return false;
     return complete(g, err);
 }
 
@@ -294,14 +380,16 @@ static bool spotread_read(struct radiometer *r, int64_t deadline_ns, struct radi
     return true;
 }
 
-// Verbose (who it is), emissive, with the spectrum, no needless calibration; then
+// Verbose (who it is), emissive, no needless calibration, with the spectrum; then
 // what the settings add, such as "-y l -X panel.ccss".
 static bool start(struct radiometer *r, struct error *err)
 {
     char words[sizeof r->options.arguments];
-    const char *argv[ARGUMENTS_MOST + 1] = {r->options.program, "-v", "-e", "-s", "-N"};
-    int argc = 5;
+    const char *argv[ARGUMENTS_MOST + 1] = {r->options.program, "-v", "-e", "-N"};
+    int argc = 4;
     char *rest = NULL;
+    if (r->spectral)
+        argv[argc++] = "-s";
     snprintf(words, sizeof words, "%s", r->options.arguments);
     for (char *w = strtok_r(words, " \t", &rest); w; w = strtok_r(NULL, " \t", &rest)) {
         if (argc == ARGUMENTS_MOST)
@@ -309,6 +397,22 @@ static bool start(struct radiometer *r, struct error *err)
         argv[argc++] = w;
     }
     return child_start(&r->child, argv, "ARGYLL_NOT_INTERACTIVE=1", err);
+}
+
+// A colorimeter that is asked for spectra ends spotread before anything else;
+// then once more without.
+static bool begin(struct radiometer *r, int64_t deadline_ns, struct error *err)
+{
+    struct reading g = {0};
+    r->spectral = r->options.spectral != RADIOMETER_SPECTRAL_NO;
+    if (start(r, err) && get_ready(r, &g, deadline_ns, err))
+        return true;
+    if (!g.no_spectra || r->options.spectral != RADIOMETER_SPECTRAL_AUTO)
+        return false;
+    child_end(&r->child);
+    r->spectral = false;
+    g = (struct reading){0};
+    return start(r, err) && get_ready(r, &g, deadline_ns, err);
 }
 
 static void spotread_close(struct radiometer *r)
@@ -331,7 +435,8 @@ static struct radiometer *spotread_open(const struct radiometer_options *options
     }
     r->options = *options;
     r->child.fd = -1;
-    if (start(r, err) && get_ready(r, deadline_ns, err))
+    r->opened = begin(r, deadline_ns, err);
+    if (r->opened)
         return r;
     if (err->code == ERROR_RETRY)
         err->code = ERROR_GONE;
@@ -342,7 +447,8 @@ static struct radiometer *spotread_open(const struct radiometer_options *options
 static void spotread_identify(const struct radiometer *r, struct instrument_identity *out)
 {
     memset(out, 0, sizeof *out);
-    snprintf(out->model, sizeof out->model, "%s", *r->model ? r->model : "by spotread");
+    snprintf(out->model, sizeof out->model, "%.*s%s", MODEL_MOST,
+             *r->model ? r->model : "by spotread", r->spectral ? "" : " (no spectra)");
     snprintf(out->serial, sizeof out->serial, "%s", r->serial);
     snprintf(out->firmware, sizeof out->firmware, "%s", r->firmware);
     out->emulated = !strncmp(r->serial, "EMU", 3);

@@ -12,9 +12,11 @@ extern const struct radiometer_driver spotread_driver;
     X(OTHER)       /* nothing to act on */                                                         \
     X(READY)       /* it waits for a key to read */                                                \
     X(CALIBRATION) /* it waits for the instrument to be put on its calibration position */         \
+    X(RETRY)       /* it waits for a key after a reading or a calibration that failed */           \
     X(XYZ)                                                                                         \
-    X(SPECTRUM) /* the spectrum's head; its values follow */                                       \
-    X(FAILED)   /* a reading or the instrument failed */
+    X(SPECTRUM)   /* the spectrum's head; its values follow */                                     \
+    X(NO_SPECTRA) /* it was asked for spectra, and its instrument, a colorimeter, has none */      \
+    X(FAILED)     /* a reading or the instrument failed */
 
 enum spotread_line {
 #define X(name) SPOTREAD_##name,
@@ -35,8 +37,9 @@ bool spotread_spectrum_head(const char *line, double *first_nm, double *last_nm,
 // something else stands there or they are too many.
 bool spotread_spectrum_values(const char *line, double *values, int most, int *got);
 
-// The error of a line that is FAILED: RANGE for saturation, GONE for a lost
-// instrument, else RETRY, with the line as text. Returns false.
+// The error of a line that is FAILED: RANGE for too much light, GONE for a lost
+// instrument, CONFIG for spectra of a colorimeter, else RETRY, with the line as
+// text. Returns false.
 bool spotread_failure(const char *line, struct error *err);
 
 #endif

@@ -83,7 +83,20 @@ static void the_lines_of_spotread_are_told_apart(void **state)
                      SPOTREAD_CALIBRATION);
     assert_int_equal(spotread_line("Hit ESC or Q to exit, any other key to take a reading: "),
                      SPOTREAD_READY);
+    assert_int_equal(spotread_line("Hit Esc or Q to give up, any other key to retry:"),
+                     SPOTREAD_RETRY);
+    assert_int_equal(spotread_line("Hit any key to retry, or Esc or Q to abort:"), SPOTREAD_RETRY);
     assert_int_equal(spotread_line("Instrument initialisation failed"), SPOTREAD_FAILED);
+    assert_int_equal(spotread_line("Got fatal error 'Bad' (Worse)"), SPOTREAD_FAILED);
+    assert_int_equal(spotread_line("Need spectral information for custom illuminant or observer"),
+                     SPOTREAD_NO_SPECTRA);
+    assert_int_equal(spotread_line("Spot read failed due to misread (Underexposure)"),
+                     SPOTREAD_FAILED);
+    assert_int_equal(spotread_line("Setting no-initial calibrate failed with 'a' (b)"),
+                     SPOTREAD_OTHER);
+    assert_int_equal(
+        spotread_line("Display/calibration type ignored - instrument doesn't support it"),
+        SPOTREAD_OTHER);
     assert_int_equal(spotread_line("Calibration complete"), SPOTREAD_OTHER);
     assert_true(spotread_xyz(" Result is XYZ: 1.5 -0.25 3.0, Yxy: 1 2 3", &xyz));
     assert_near(xyz.Y, -0.25, arithmetic);
@@ -148,17 +161,38 @@ static void one_blank_goes_out_for_each_reading(void **state)
     spotread_driver.close(r);
 }
 
-static void a_colorimeter_has_no_spectrum(void **state)
+static void a_colorimeter_has_no_spectrum_and_says_so(void **state)
 {
     (void)state;
     struct error err = {0};
     struct radiance_sample s;
+    struct instrument_identity who;
     struct radiometer *r = open_how("colorimeter", &err);
     assert_non_null(r);
+    spotread_driver.identify(r, &who);
+    assert_string_equal(who.model, "i1 Pro (no spectra)");
     assert_true(spotread_driver.read(r, soon(), &s, &err));
     assert_int_equal(s.count, 0);
     assert_near(s.xyz.Z, 93.125, arithmetic);
     spotread_driver.close(r);
+}
+
+static void whether_spectra_are_asked_for_is_a_setting(void **state)
+{
+    (void)state;
+    struct error err = {0};
+    struct radiometer_options o = options_for("colorimeter");
+    o.spectral = RADIOMETER_SPECTRAL_YES;
+    assert_null(spotread_driver.open(&o, soon(), &err));
+    assert_int_equal(err.code, ERROR_CONFIG);
+    assert_non_null(strstr(err.text, "spectral = auto"));
+    o.spectral = RADIOMETER_SPECTRAL_NO;
+    struct radiometer *r = spotread_driver.open(&o, soon(), &err);
+    assert_non_null(r);
+    spotread_driver.close(r);
+    o = options_for("colorimeter -s"); // asked for by the arguments, too: once more and no oftener
+    assert_null(spotread_driver.open(&o, soon(), &err));
+    assert_int_equal(err.code, ERROR_CONFIG);
 }
 
 static void a_failed_reading_names_its_cause_and_the_next_one_works(void **state)
@@ -168,9 +202,11 @@ static void a_failed_reading_names_its_cause_and_the_next_one_works(void **state
         const char *how, *says;
         enum error_code code;
     } rows[] = {
-        {"misread", "misread", ERROR_RETRY}, {"saturated", "saturated", ERROR_RANGE},
-        {"dark", "too low", ERROR_RETRY},    {"cut", "60 values instead of 101", ERROR_RETRY},
-        {"garbage", "?[31m", ERROR_RETRY},   {"huge", "99999", ERROR_RETRY},
+        {"misread", "Inconsistent", ERROR_RETRY},  {"saturated", "saturated", ERROR_RANGE},
+        {"bright", "too high", ERROR_RANGE},       {"dark", "too low", ERROR_RETRY},
+        {"specbos", "Overexposure", ERROR_RANGE},  {"untold", "Something else", ERROR_RETRY},
+        {"turned", "wrong position", ERROR_RETRY}, {"cut", "60 values instead of 101", ERROR_RETRY},
+        {"garbage", "?[31m", ERROR_RETRY},         {"huge", "99999", ERROR_RETRY},
         {"nan", "no result", ERROR_RETRY},
     };
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
@@ -201,6 +237,41 @@ static void a_late_result_is_waited_for_and_not_taken_for_the_next(void **state)
     assert_int_equal(err.code, ERROR_RETRY);
     assert_true(spotread_driver.read(r, soon(), &s, &err));
     assert_string_equal(keys(), "32\n32\n"); // none while the first one was under way
+    spotread_driver.close(r);
+}
+
+static void a_late_failure_is_answered_before_the_next_reading(void **state)
+{
+    (void)state;
+    struct error err = {0};
+    struct radiance_sample s;
+    struct radiometer *r = open_how("late", &err);
+    assert_non_null(r);
+    assert_false(spotread_driver.read(r, clock_now_ns() + 50 * NS_PER_MS, &s, &err));
+    assert_int_equal(err.code, ERROR_RETRY);
+    assert_true(spotread_driver.read(r, soon(), &s, &err));
+    assert_string_equal(keys(), "32\n32\n32\n"); // a reading, any other key, a reading
+    spotread_driver.close(r);
+}
+
+static void a_communication_problem_is_gone_and_not_answered(void **state)
+{
+    (void)state;
+    struct error err = {0};
+    struct radiance_sample s;
+    struct radiometer *r = open_how("cable", &err);
+    assert_non_null(r);
+    assert_true(spotread_driver.read(r, soon(), &s, &err));
+    assert_false(spotread_driver.read(r, soon(), &s, &err));
+    assert_int_equal(err.code, ERROR_GONE);
+    assert_non_null(strstr(err.text, "communication problem"));
+    assert_string_equal(keys(), "32\n32\n");
+    spotread_driver.close(r);
+    r = open_how("fatal", &err);
+    assert_non_null(r);
+    assert_false(spotread_driver.read(r, soon(), &s, &err));
+    assert_int_equal(err.code, ERROR_GONE);
+    assert_non_null(strstr(err.text, "It broke"));
     spotread_driver.close(r);
 }
 
@@ -244,6 +315,12 @@ static void what_cannot_start_says_why(void **state)
     assert_null(spotread_driver.open(&o, soon(), &err));
     assert_int_equal(err.code, ERROR_CONFIG);
     assert_non_null(strstr(err.text, "/nowhere/spotread"));
+    o = options_for("unfit");
+    assert_null(spotread_driver.open(&o, soon(), &err));
+    assert_non_null(strstr(err.text, "support it"));
+    o = options_for("shy");
+    assert_null(spotread_driver.open(&o, soon(), &err));
+    assert_non_null(strstr(err.text, "ended with 1: Good bye"));
     o = options_for("mute");
     assert_null(spotread_driver.open(&o, clock_now_ns() + 300 * NS_PER_MS, &err));
     assert_int_equal(err.code, ERROR_GONE);
@@ -268,6 +345,29 @@ static void calibration_happens_only_when_the_settings_say_so(void **state)
     o.calibrate = true;
     assert_null(spotread_driver.open(&o, soon(), &err));
     assert_string_equal(keys(), "32\n");
+    o = options_for("uncalibrated");
+    o.calibrate = true;
+    assert_null(spotread_driver.open(&o, soon(), &err));
+    assert_int_equal(err.code, ERROR_GONE);
+    assert_non_null(strstr(err.text, "White reference"));
+    assert_string_equal(keys(), "32\n");
+}
+
+static void nobody_calibrates_on_a_light_even_late(void **state)
+{
+    (void)state;
+    struct error err = {0};
+    struct radiance_sample s;
+    struct radiometer_options o = options_for("recalibrate");
+    o.calibrate = true;
+    struct radiometer *r = spotread_driver.open(&o, soon(), &err);
+    assert_non_null(r);
+    assert_false(spotread_driver.read(r, clock_now_ns() + 50 * NS_PER_MS, &s, &err));
+    assert_int_equal(err.code, ERROR_RETRY);
+    assert_false(spotread_driver.read(r, soon(), &s, &err));
+    assert_int_equal(err.code, ERROR_GONE);
+    assert_string_equal(keys(), "32\n");
+    spotread_driver.close(r);
 }
 
 int main(void)
@@ -276,12 +376,16 @@ int main(void)
         cmocka_unit_test(the_lines_of_spotread_are_told_apart),
         cmocka_unit_test(a_reading_has_xyz_and_its_spectrum_in_watts),
         cmocka_unit_test(one_blank_goes_out_for_each_reading),
-        cmocka_unit_test(a_colorimeter_has_no_spectrum),
+        cmocka_unit_test(a_colorimeter_has_no_spectrum_and_says_so),
+        cmocka_unit_test(whether_spectra_are_asked_for_is_a_setting),
         cmocka_unit_test(a_failed_reading_names_its_cause_and_the_next_one_works),
         cmocka_unit_test(a_late_result_is_waited_for_and_not_taken_for_the_next),
+        cmocka_unit_test(a_late_failure_is_answered_before_the_next_reading),
+        cmocka_unit_test(a_communication_problem_is_gone_and_not_answered),
         cmocka_unit_test(a_pulled_cable_or_a_dead_process_is_gone),
         cmocka_unit_test(what_cannot_start_says_why),
         cmocka_unit_test(calibration_happens_only_when_the_settings_say_so),
+        cmocka_unit_test(nobody_calibrates_on_a_light_even_late),
     };
     return cmocka_run_group_tests(tests, a_folder, no_folder);
 }

@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 # spotread as far as the driver sees it. Options as spotread's are passed over;
 # how=WORD says how it behaves, keys=FILE gets every byte pressed as a number.
-how=fine keys=/dev/null
+how=fine keys=/dev/null spectra=no
 for word in "$@"; do
     case "$word" in
+    -s) spectra=yes ;;
     how=*) how=${word#how=} ;;
     keys=*) keys=${word#keys=} ;;
     esac
@@ -25,6 +26,11 @@ spectrum() {
     done
     printf '\n'
 }
+failed() { # and waits, its prompt without an end of line
+    printf '\n\nSpot read failed due to %s\nHit Esc or Q to give up, any other key to retry:' "$1"
+    key
+    printf '\n'
+}
 result() { printf '\n Result is XYZ: 81.250000 85.500000 93.125000, D50 Lab: 93.0 -1.0 -18.0\n'; }
 prompt() {
     printf '\nPlace instrument on spot to be measured,\n'
@@ -40,7 +46,22 @@ prompt() {
 [ "$how" != mute ] || { key; exit 0; }
 [ -n "$ARGYLL_NOT_INTERACTIVE" ] || exit 9
 printf 'Connecting to the instrument ..\nInstrument Type:   i1 Pro\nSerial Number:     EMU12345\nFirmware version:  502\n'
+if [ "$how" = colorimeter ] && [ $spectra = yes ]; then
+    printf 'Need spectral information for custom illuminant or observer\n'
+    printf "and instrument doesn't support it\n"
+    exit 255
+fi
+[ "$how" != unfit ] || { printf "Need emissive spot capability\nand instrument doesn't support it\n"; exit 255; }
+[ "$how" != colorimeter ] || printf "Setting no-initial calibrate failed with 'Unsupported function' (Success)\n"
+[ "$how" != shy ] || { printf 'Good bye\n'; exit 1; }
 case "$how" in
+uncalibrated)
+    printf '\nSet instrument sensor to calibration position,\n and then hit any key to continue: '
+    key
+    printf "\nCalibration failed with 'Calibration failed' (White reference is out of range)\n"
+    printf 'Hit any key to retry, or Esc or Q to abort: '
+    key
+    ;;
 calibrate | stubborn)
     printf '\nSet instrument sensor to calibration position,\n and then hit any key to continue,\n or hit Esc or Q to abort: '
     key
@@ -57,9 +78,22 @@ while :; do
     key
     count=$((count + 1))
     case "$how-$count" in
-    misread-1) printf '\nSpot read failed due to misread (Inconsistent readings)\n' ;;
-    saturated-1) printf '\nSpot read failed: Sensor is saturated\n' ;;
-    dark-1) printf '\nSpot read failed: Signal level is too low\n' ;;
+    misread-1) failed 'misread (Inconsistent readings)' ;;
+    saturated-1) failed 'misread (Sensor is saturated)' ;;
+    bright-1) failed 'misread (Light level is too high)' ;;
+    specbos-1) failed 'misread (Overexposure)' ;;
+    dark-1) failed 'misread (Light level is too low)' ;;
+    untold-1) printf '\nSomething else\nHit Esc or Q to give up, any other key to retry:'; key ;;
+    turned-1) printf '\nSpot read failed due to the sensor being in the wrong position\n(Cover is on)\n' ;;
+    late-1) sleep 0.4; failed 'misread (Inconsistent readings)' ;;
+    cable-2) failed 'communication problem.' ;;
+    fatal-1) printf "\n\nGot fatal error 'Hardware Failure' (It broke)\n"; exit 0 ;;
+    recalibrate-1)
+        sleep 0.4
+        printf '\nSpot read failed because instruments needs calibration.\n'
+        printf 'Set instrument sensor to calibration position,\n and then hit any key to continue: '
+        key
+        ;;
     pulled-2) printf '\nSpot read failed with Communications failure\n'; exit 1 ;;
     killed-1) kill -9 $$ ;;
     slow-1) sleep 0.4; spectrum 101; result ;;

@@ -48,6 +48,12 @@ static int open_i1pro(void **state)
     return open_with("[spotread]\nmodel = i1pro\n", "--set radiometer.calibrate=yes");
 }
 
+static int open_i1d3(void **state)
+{
+    (void)state;
+    return open_with("[spotread]\nmodel = i1d3\n", "");
+}
+
 static int leave(void **state)
 {
     (void)state;
@@ -56,11 +62,16 @@ static int leave(void **state)
     return booth_close(&here);
 }
 
+static json_t *ask_to_measure(struct error *err)
+{
+    return control_call(daemon_client,
+                        json_pack("{ss,si}", "do", "measure", "timeout_s", MEASURE_S),
+                        BOOTH_CALL_MS, err);
+}
+
 static bool measure(double xyz[3], struct error *err)
 {
-    json_t *reply =
-        control_call(daemon_client, json_pack("{ss,si}", "do", "measure", "timeout_s", MEASURE_S),
-                     BOOTH_CALL_MS, err);
+    json_t *reply = ask_to_measure(err);
     const json_t *values = json_object_get(reply, "XYZ");
     for (size_t i = 0; i < 3; i++)
         xyz[i] = json_number_value(json_array_get(values, i));
@@ -131,13 +142,70 @@ static void await_a_reading(void)
     }
 }
 
-static void fails_and_recovers(const char *kind)
+// Each reading fails with its cause; after the fault has gone the next one works.
+static void fails_and_recovers(const char *kind, const char *cause)
 {
     double xyz[3];
     struct error err = {0};
     assert_true(booth_fault(booth_client, "spotread", kind));
+    for (int i = 0; i < 2; i++) {
+        assert_false(measure(xyz, &err));
+        if (!strstr(err.text, cause))
+            print_error("%s: %s\n", kind, err.text);
+        assert_non_null(strstr(err.text, cause));
+    }
+    assert_true(booth_fault(booth_client, "spotread", "fine"));
+}
+
+static void too_little_and_too_much_light_are_named_and_the_next_reading_works(void **state)
+{
+    (void)state;
+    fails_and_recovers("weak-light", "Underexposure");
+    expect_what_the_pr655_sees(NEAR);
+    fails_and_recovers("overload", "Overexposure");
+    expect_what_the_pr655_sees(NEAR);
+}
+
+static void a_misread_is_named_and_the_next_reading_works(void **state)
+{
+    (void)state;
+    double xyz[3];
+    int failed = 0;
+    struct error err = {0};
+    assert_true(booth_fault(booth_client, "spotread", "misread"));
+    for (int i = 0; i < 9; i++) // every third is false: by turns too high, failed, far too high
+        if (!measure(xyz, &err)) {
+            assert_non_null(strstr(err.text, "misread"));
+            failed++;
+        }
+    assert_int_equal(failed, 1);
+    assert_true(booth_fault(booth_client, "spotread", "fine"));
+    expect_what_the_pr655_sees(NEAR);
+}
+
+static void a_pulled_cable_is_named_and_spotread_is_started_again(void **state)
+{
+    (void)state;
+    double xyz[3];
+    struct error err = {0};
+    assert_true(booth_fault(booth_client, "spotread", "unplugged"));
     assert_false(measure(xyz, &err));
-    print_message("%s: %s\n", kind, err.text);
+    assert_non_null(strstr(err.text, "communication problem"));
+    assert_false(measure(xyz, &err)); // started without its instrument
+    assert_non_null(strstr(err.text, "spotread"));
+    assert_null(strstr(err.text, "says nothing"));
+    assert_true(booth_fault(booth_client, "spotread", "fine"));
+    await_a_reading();
+    expect_what_the_pr655_sees(NEAR);
+}
+
+static void a_silent_one_is_waited_for_until_it_speaks(void **state)
+{
+    (void)state;
+    double xyz[3];
+    struct error err = {0};
+    assert_true(booth_fault(booth_client, "spotread", "silent"));
+    assert_false(measure(xyz, &err));
     assert_true(booth_fault(booth_client, "spotread", "fine"));
     await_a_reading();
     expect_what_the_pr655_sees(NEAR);
@@ -146,18 +214,56 @@ static void fails_and_recovers(const char *kind)
 static void a_fatal_error_ends_the_reading_and_spotread_is_started_again(void **state)
 {
     (void)state;
-    fails_and_recovers("stall");
+    fails_and_recovers("stall", "fatal error");
+    await_a_reading();
+    expect_what_the_pr655_sees(NEAR);
+}
+
+static void a_colorimeter_measures_without_a_spectrum(void **state)
+{
+    (void)state;
+    struct error err = {0};
+    json_t *reply = ask_to_measure(&err);
+    if (!reply)
+        print_error("%s\n", err.text);
+    assert_non_null(reply);
+    assert_int_equal(json_array_size(json_object_get(reply, "values")), 0);
+    assert_non_null(strstr(dig_text(reply, "instrument"), "(no spectra)"));
+    json_decref(reply);
+    expect_what_the_pr655_sees(BROADLY);
+}
+
+static void a_colorimeter_that_was_away_measures_again(void **state)
+{
+    (void)state;
+    double xyz[3];
+    struct error err = {0};
+    assert_true(booth_fault(booth_client, "spotread", "unplugged"));
+    assert_false(measure(xyz, &err));
+    assert_non_null(strstr(err.text, "communication problem"));
+    assert_true(booth_fault(booth_client, "spotread", "fine"));
+    await_a_reading();
+    expect_what_the_pr655_sees(BROADLY);
 }
 
 int main(void)
 {
     const struct CMUnitTest specbos[] = {
         cmocka_unit_test(it_measures_what_the_pr655_does),
+        cmocka_unit_test(too_little_and_too_much_light_are_named_and_the_next_reading_works),
+        cmocka_unit_test(a_misread_is_named_and_the_next_reading_works),
+        cmocka_unit_test(a_pulled_cable_is_named_and_spotread_is_started_again),
+        cmocka_unit_test(a_silent_one_is_waited_for_until_it_speaks),
         cmocka_unit_test(a_fatal_error_ends_the_reading_and_spotread_is_started_again),
     };
     const struct CMUnitTest i1pro[] = {
         cmocka_unit_test(another_one_does_broadly),
     };
+    const struct CMUnitTest i1d3[] = {
+        cmocka_unit_test(a_colorimeter_measures_without_a_spectrum),
+        cmocka_unit_test(a_colorimeter_that_was_away_measures_again),
+    };
     return cmocka_run_group_tests(specbos, open_specbos, leave) +
-           cmocka_run_group_tests(i1pro, open_i1pro, leave);
+           cmocka_run_group_tests(i1pro, open_i1pro, leave) +
+           cmocka_run_group_tests(i1d3, open_i1d3, leave);
 }
