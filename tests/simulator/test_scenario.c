@@ -90,7 +90,7 @@ static void the_shipped_booth_loads_with_its_three_lamps(void **state)
     assert_int_equal(s.lamps[0].form, LAMP_SPOTS);
     assert_string_equal(s.lamps[2].spectrum, "FL3.15");
     assert_int_equal(s.screen.width_px, 1280);
-    assert_true(s.panel.white_cdm2 == 1200);
+    assert_true(s.panel.white_cdm2 == 1500);
 }
 
 static void a_bad_scenario_is_refused_by_file_and_key(void **state)

@@ -16,7 +16,7 @@
 #define WARMED 1e-6      // relative: fifteen time constants leave e^-15 of the drop
 #define CAST 1e-6        // m: places and angles are far above it
 
-static const double WHITE = 1200; // cd/m2, of the shipped panel
+static const double WHITE = 1500; // cd/m2, of the shipped panel
 static const int64_t start_ns = 1000 * NS_PER_S;
 static struct world *world;
 static struct around around;

@@ -18,7 +18,7 @@ static const double LIGHT = 0.01;   // three spot readings scale the map, noise 
 static const double CEILING_W = 0.90, CEILING_D = 0.60, CEILING_Z = 0.05; // m
 static const double BESIDE_M = 0.006;   // half of what the radiometer sees, and aiming's error
 static const double SPOT_MOST = 20000;  // cd/m2: brighter ones may overload the radiometer
-static const double PANEL_WHITE = 1200;  // cd/m2, at its centre
+static const double PANEL_WHITE = 1500;  // cd/m2, at its centre
 static const double WHITE_SHARE = 0.02; // its warm-up, the radiometer's error
 
 static struct folder here;
