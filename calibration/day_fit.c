@@ -396,6 +396,21 @@ static int build(const struct fit *f, const double *x, struct display_model *mod
     return pooled;
 }
 
+static struct least_squares problem_of(struct fit *f)
+{
+    return (struct least_squares){
+        .parameters = f->parameters,
+        .groups =
+            f->m->count + f->splines.slopes + (f->kind == DISPLAY_INTERACTION ? DISPLAY_TERMS : 0),
+        .group_size = 3,
+        .evaluate = residuals_of,
+        .context = f,
+        .robust = ROBUST_DE00,
+        .tolerance = 1e-7,
+        .iterations = ITERATIONS_MOST,
+    };
+}
+
 bool day_fit(const struct measurements *m, enum display_kind kind, struct day_fit *at,
              struct display_model *model, struct error *err)
 {
@@ -403,16 +418,7 @@ bool day_fit(const struct measurements *m, enum display_kind kind, struct day_fi
     struct least_squares_result result;
     struct day_fit found = *at;
     struct display_model built = *model;
-    const struct least_squares problem = {
-        .parameters = f.parameters,
-        .groups = m->count + f.splines.slopes + (kind == DISPLAY_INTERACTION ? DISPLAY_TERMS : 0),
-        .group_size = 3,
-        .evaluate = residuals_of,
-        .context = &f,
-        .robust = ROBUST_DE00,
-        .tolerance = 1e-7,
-        .iterations = ITERATIONS_MOST,
-    };
+    const struct least_squares problem = problem_of(&f);
     if (!aim(&f, err)) {
         free(f.targets);
         return while_doing(err, "%s", m->path);
@@ -428,6 +434,62 @@ bool day_fit(const struct measurements *m, enum display_kind kind, struct day_fi
     *at = found;
     *model = built;
     return true;
+}
+
+// ---- what the solution leaves open -----------------------------------------
+
+static double residual_variance(const struct fit *f, const double *x)
+{
+    double sum = 0, r[3] = {0, 0, 0};
+    for (int i = 0; i < f->m->count; i++) {
+        patch_residuals(f, i, x, r, NULL);
+        sum += r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
+    }
+    int freedom = 3 * f->m->count - f->parameters;
+    return sum / (freedom > 1 ? freedom : 1);
+}
+
+// variance * slopes inner slopes', n rows of p slopes.
+static void sandwich(const double *slopes, const double *inner, double variance, int n, int p,
+                     double *room, double *out)
+{
+    for (int i = 0; i < n; i++) {
+        const double *row = slopes + (long)i * p;
+        for (int k = 0; k < p; k++) {
+            room[k] = 0;
+            for (int j = 0; j < p; j++)
+                room[k] += row[j] * inner[(long)j * p + k];
+        }
+        for (int j = 0; j < n; j++) {
+            double sum = 0;
+            for (int k = 0; k < p; k++)
+                sum += room[k] * slopes[(long)j * p + k];
+            out[(long)i * n + j] = variance * sum;
+        }
+    }
+}
+
+bool day_fit_covariance(const struct measurements *m, enum display_kind kind,
+                        const struct day_fit *at, const struct counts *counts, int n,
+                        double *covariance, struct error *err)
+{
+    struct fit f = fit_of(m, kind, at->intervals);
+    const size_t p = (size_t)f.parameters;
+    const struct least_squares problem = problem_of(&f);
+    double *inner = malloc(p * p * sizeof *inner);
+    double *slopes = malloc(((size_t)3 * (size_t)n + 1) * p * sizeof *slopes);
+    bool ok = (inner && slopes) || fail(err, ERROR_SYSTEM, "out of memory for a covariance");
+    ok = ok && aim(&f, err) && least_squares_covariance(&problem, at->x, inner, err);
+    if (ok) {
+        for (int i = 0; i < n; i++)
+            day_fit_slopes(at, kind, counts[i], m->white, slopes + 3 * p * (size_t)i);
+        sandwich(slopes, inner, residual_variance(&f, at->x), 3 * n, f.parameters,
+                 slopes + 3 * p * (size_t)n, covariance);
+    }
+    free(inner);
+    free(slopes);
+    free(f.targets);
+    return ok;
 }
 
 struct lab day_fit_lab(const struct day_fit *at, enum display_kind kind, struct counts counts,

@@ -42,6 +42,14 @@ struct day_fit day_fit_start(int intervals);
 bool day_fit(const struct measurements *m, enum display_kind kind, struct day_fit *at,
              struct display_model *model, struct error *err);
 
+// Covariance of L*, a*, b* that a solution predicts at n counts, 3n x 3n: the
+// solver's covariance of the parameters (J'J)^-1, scaled by the variance of the
+// patches' residuals, through the slopes. DATA when the patches do not decide
+// every parameter.
+bool day_fit_covariance(const struct measurements *m, enum display_kind kind,
+                        const struct day_fit *at, const struct counts *counts, int n,
+                        double *covariance, struct error *err);
+
 // Number of parameters of a kind.
 int day_fit_parameters(enum display_kind kind, int intervals);
 

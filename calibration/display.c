@@ -100,22 +100,40 @@ static int command_check(int argc, char **argv)
 
 // ---- forward, inverse ------------------------------------------------------
 
-static bool one_forward(const struct display_model *model, const double v[3], FILE *out,
-                        struct error *err)
+// A model as its file gives it.
+struct panel {
+    struct display_model model;
+    struct display_origin origin;
+    bool uncertain; // uncertainties are wanted too
+};
+
+static void print_uncertainty(const struct panel *p, struct counts counts, FILE *out)
+{
+    const struct display_uncertainty *u = &p->origin.uncertainty;
+    double c[9];
+    display_uncertainty_xyz(u, &p->model, &counts, 1, c);
+    fprintf(out, " %.4g %.4g %.4g %.4g", sqrt(c[0]), sqrt(c[4]), sqrt(c[8]),
+            display_uncertainty_de00(u, &p->model, counts));
+}
+
+static bool one_forward(const struct panel *p, const double v[3], FILE *out, struct error *err)
 {
     for (int i = 0; i < 3; i++)
         if (v[i] < 0 || v[i] > 100)
             return fail(err, ERROR_RANGE, "RGB: %g is outside 0..100", v[i]);
-    struct xyz c = display_forward(model, (struct counts){v[0] / 100, v[1] / 100, v[2] / 100});
-    fprintf(out, "%.10g %.10g %.10g\n", c.X, c.Y, c.Z);
+    struct counts counts = {v[0] / 100, v[1] / 100, v[2] / 100};
+    struct xyz c = display_forward(&p->model, counts);
+    fprintf(out, "%.10g %.10g %.10g", c.X, c.Y, c.Z);
+    if (p->uncertain)
+        print_uncertainty(p, counts, out);
+    fputc('\n', out);
     return true;
 }
 
-static bool one_inverse(const struct display_model *model, const double v[3], FILE *out,
-                        struct error *err)
+static bool one_inverse(const struct panel *p, const double v[3], FILE *out, struct error *err)
 {
     (void)err;
-    struct display_inverse at = display_invert(model, (struct xyz){v[0], v[1], v[2]});
+    struct display_inverse at = display_invert(&p->model, (struct xyz){v[0], v[1], v[2]});
     fprintf(out, "%.10g %.10g %.10g%s\n", 100 * at.counts.r, 100 * at.counts.g, 100 * at.counts.b,
             at.in_gamut ? "" : " out-of-gamut");
     return true;
@@ -123,17 +141,17 @@ static bool one_inverse(const struct display_model *model, const double v[3], FI
 
 struct filter {
     const char *names; // of the numbers of a line
-    bool (*one)(const struct display_model *, const double v[3], FILE *, struct error *);
+    bool (*one)(const struct panel *, const double v[3], FILE *, struct error *);
 };
 
-static bool all_lines(const struct display_model *model, const struct filter *filter, FILE *out,
+static bool all_lines(const struct panel *panel, const struct filter *filter, FILE *out,
                       struct error *err)
 {
     struct lines l = {.in = stdin, .name = "stdin"};
     bool end = false, ok = true;
     while (ok && lines_next(&l, &end, err)) {
         double v[3];
-        ok = (line_numbers(l.text, 3, filter->names, v, err) && filter->one(model, v, out, err)) ||
+        ok = (line_numbers(l.text, 3, filter->names, v, err) && filter->one(panel, v, out, err)) ||
              while_doing(err, "stdin:%d", l.number);
     }
     lines_fini(&l);
@@ -141,15 +159,14 @@ static bool all_lines(const struct display_model *model, const struct filter *fi
 }
 
 // Nothing is printed before the last line was understood.
-static bool print_lines(const struct display_model *model, const struct filter *filter,
-                        struct error *err)
+static bool print_lines(const struct panel *panel, const struct filter *filter, struct error *err)
 {
     char *text = NULL;
     size_t size = 0;
     FILE *out = open_memstream(&text, &size);
     if (!out)
         return fail_errno(err, "no memory for the answer");
-    bool ok = all_lines(model, filter, out, err);
+    bool ok = all_lines(panel, filter, out, err);
     if (fclose(out) && ok)
         ok = fail_errno(err, "no memory for the answer");
     if (ok)
@@ -158,31 +175,37 @@ static bool print_lines(const struct display_model *model, const struct filter *
     return ok;
 }
 
-static int run_lines(int argc, char **argv, const struct filter *filter)
+static bool load_and_print(const char *path, bool uncertain, const struct filter *filter,
+                           struct error *err)
 {
-    if (argc != 2 || argv[1][0] == '-')
-        return command_bad_usage("usage: boothcal display %s D.ini <LINES", argv[0]);
-    struct error err;
-    struct display_model *model = malloc(sizeof *model);
-    if (!model) {
-        fail(&err, ERROR_SYSTEM, "out of memory");
-        return command_failed(&err);
-    }
-    bool ok = display_load(argv[1], model, NULL, &err) && print_lines(model, filter, &err);
-    free(model);
-    return ok ? COMMAND_FINE : command_bad_input(&err);
+    struct panel *panel = malloc(sizeof *panel);
+    if (!panel)
+        return fail(err, ERROR_SYSTEM, "out of memory");
+    panel->uncertain = uncertain;
+    bool ok =
+        display_load(path, &panel->model, &panel->origin, err) && print_lines(panel, filter, err);
+    free(panel);
+    return ok;
 }
 
 static int command_forward(int argc, char **argv)
 {
     static const struct filter FORWARD = {"three numbers, R G B", one_forward};
-    return run_lines(argc, argv, &FORWARD);
+    struct error err;
+    bool uncertain = argc == 3 && !strcmp(argv[2], "--uncertainty");
+    if (argc != 2 + uncertain || argv[1][0] == '-')
+        return command_bad_usage("usage: boothcal display forward D.ini [--uncertainty] <LINES");
+    return load_and_print(argv[1], uncertain, &FORWARD, &err) ? COMMAND_FINE
+                                                              : command_bad_input(&err);
 }
 
 static int command_inverse(int argc, char **argv)
 {
     static const struct filter INVERSE = {"three numbers, X Y Z", one_inverse};
-    return run_lines(argc, argv, &INVERSE);
+    struct error err;
+    if (argc != 2 || argv[1][0] == '-')
+        return command_bad_usage("usage: boothcal display inverse D.ini <LINES");
+    return load_and_print(argv[1], false, &INVERSE, &err) ? COMMAND_FINE : command_bad_input(&err);
 }
 
 int command_display(int argc, char **argv)
@@ -213,7 +236,8 @@ int command_display(int argc, char **argv)
          "by more than 3 %)."},
         {"view", view_measure, "--config FILE -o VIEW.ini [OPTION]...",
          "How the display's light depends on the direction it is seen from and on the place on\n"
-         "      the screen: measures five patches from each, fits, goes on where it was interrupted.\n"
+         "      the screen: measures five patches from each, fits, goes on where it was "
+         "interrupted.\n"
          "\n"
          "  --config FILE    boothd's settings\n"
          "  --socket PATH    boothd's control socket (default: the settings', else the user's)\n"
@@ -227,7 +251,8 @@ int command_display(int argc, char **argv)
          "  -o VIEW.ini      where the result goes; VIEW.ini.journal holds every reading\n"
          "  --help\n"
          "\n"
-         "Exit 3: done, with a warning (white is left more than 1 CIEDE2000 off in some direction)."},
+         "Exit 3: done, with a warning (white is left more than 1 CIEDE2000 off in some "
+         "direction)."},
         {"fit", display_fitting, "TRAIN.ti3 -o D.ini [--model KIND] [--json]",
          "Fits a display model to measured patches.\n"
          "\n"
@@ -251,10 +276,12 @@ int command_display(int argc, char **argv)
          "             white, with exit 3\n"
          "  --json     one JSON object\n"
          "  --help"},
-        {"forward", command_forward, "D.ini",
+        {"forward", command_forward, "D.ini [--uncertainty]",
          "Reads \"R G B\" (0..100) a line, writes \"X Y Z\" in cd/m2 a line.\n"
          "\n"
-         "  D.ini      model, as display fit writes it\n"
+         "  D.ini          model, as display fit writes it\n"
+         "  --uncertainty  and the standard uncertainties of X, Y and Z as the model predicts\n"
+         "                 them, in cd/m2, and of all three together in CIEDE2000\n"
          "  --help"},
         {"inverse", command_inverse, "D.ini",
          "Reads \"X Y Z\" in cd/m2 a line, writes \"R G B\" (0..100) a line; a fourth word\n"

@@ -112,7 +112,7 @@ static void try_one(const struct fold *fold, const struct measurements *m, enum 
     struct error why;
     struct residual_fit found;
     struct day_fit at = starts[kind == DISPLAY_INTERACTION];
-    bool fitted = kind == DISPLAY_RESIDUAL ? residual_fit(&fold->seen, model, &found, &why)
+    bool fitted = kind == DISPLAY_RESIDUAL ? residual_fit(&fold->seen, model, &found, NULL, &why)
                                            : day_fit(&fold->seen, kind, &at, model, &why);
     if (fitted)
         ask(fold, m, model, cross);

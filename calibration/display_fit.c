@@ -5,6 +5,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "calibration/uncertainty_fit.h"
+
 static const double CONDITION_WARN = 10;
 static const double MISFIT_MEAN = 0.6;
 static const double MISFIT_P95 = 2;
@@ -96,6 +98,9 @@ static bool judge(const struct measurements *m, const struct display_model *kept
 struct fitted {
     struct day_fit starts[2]; // DAY, INTERACTION
     struct display_model models[DISPLAY_KIND_COUNT];
+    // Of L*, a*, b* at the places of display_uncertainty, by the residual's fit.
+    double spread[3 * UNCERTAINTY_PLACES * 3 * UNCERTAINTY_PLACES];
+    struct counts places[UNCERTAINTY_PLACES];
 };
 
 static void try_interaction(const struct measurements *m, struct fitted *f,
@@ -114,9 +119,10 @@ static void try_residual(const struct measurements *m, struct fitted *f, struct 
                          struct display_candidate *c)
 {
     struct error why;
+    const struct residual_spread spread = {f->places, UNCERTAINTY_PLACES, f->spread};
     f->models[DISPLAY_RESIDUAL] = f->models[DISPLAY_DAY];
     c->tried = true;
-    c->fitted = residual_fit(m, &f->models[DISPLAY_RESIDUAL], &found->residual, &why);
+    c->fitted = residual_fit(m, &f->models[DISPLAY_RESIDUAL], &found->residual, &spread, &why);
     if (!c->fitted)
         display_give_up(c, &why);
 }
@@ -141,14 +147,40 @@ static bool fit_candidates(const struct measurements *m, const enum display_kind
     return !only || c[*only].fitted || fail(err, ERROR_DATA, "%s", c[*only].failed);
 }
 
+static void keep_simplest(struct display_fit *found, const struct error *why)
+{
+    int kind = 0;
+    while (kind < DISPLAY_RESIDUAL && !found->choice.candidates[kind].tried)
+        kind++;
+    found->choice.kind = found->choice.best = (enum display_kind)kind;
+    found->choice.scored = 0;
+    snprintf(found->not_validated, sizeof found->not_validated, "%.190s", why->text);
+}
+
+// Covariance of the parameters; without it what left-out patches say stands
+// alone.
+static void find_modes(const struct measurements *m, struct fitted *f, struct display_fit *found)
+{
+    const enum display_kind kind = found->choice.kind;
+    if (kind == DISPLAY_RESIDUAL || day_fit_covariance(m, kind, &f->starts[kind], f->places,
+                                                       UNCERTAINTY_PLACES, f->spread, NULL))
+        uncertainty_modes(f->spread, &found->uncertainty, NULL);
+}
+
 static bool choose(const struct measurements *m, struct fitted *f, struct display_fit *found,
                    struct error *err)
 {
     struct display_cross cross;
-    if (!display_choose(m, f->starts, &found->choice, &cross, err))
-        return false;
+    struct error why;
+    if (!display_choose(m, f->starts, &found->choice, &cross, &why)) {
+        keep_simplest(found, &why);
+        find_modes(m, f, found);
+        return true;
+    }
+    find_modes(m, f, found);
+    bool ok = uncertainty_rest(m, &cross, &f->models[found->choice.kind], &found->uncertainty, err);
     display_cross_fini(&cross);
-    return true;
+    return ok;
 }
 
 bool display_fit(const struct measurements *m, const enum display_kind *only,
@@ -158,6 +190,8 @@ bool display_fit(const struct measurements *m, const enum display_kind *only,
     struct fitted *f = calloc(1, sizeof *f);
     if (!f)
         return fail(err, ERROR_SYSTEM, "out of memory for display models");
+    for (int p = 0; p < UNCERTAINTY_PLACES; p++)
+        f->places[p] = uncertainty_place(p);
     bool ok = fit_candidates(m, only, f, &facts, err) && choose(m, f, &facts, err);
     struct display_model *kept = &f->models[facts.choice.kind];
     ok = ok && judge(m, kept, &f->models[DISPLAY_DAY], &facts, err);

@@ -8,6 +8,7 @@
 #include "calibration/display_choice.h"
 #include "calibration/residual_fit.h"
 #include "calibration/statistics.h"
+#include "colorimetry/display_uncertainty.h"
 
 // What the fit found out, besides the model.
 struct display_fit {
@@ -15,14 +16,17 @@ struct display_fit {
     struct summary de00;             // over the fitted patches
     struct summary day;              // likewise, of plain Day alone
     struct display_choice choice;    // which kind was kept, and why
+    char not_validated[200];         // why there is no choice but the simplest, and no uncertainty
+                                     // but that of the parameters; ""
     struct residual_fit residual;    // when it was tried
-    bool primaries;                  // red, green, blue, white and black were all measured
-    double additivity;               // luminance of R + G + B - 2 black over white, less 1
-    bool ill_conditioned;            // condition > 10: noise grows tenfold
-    bool misfit;                     // plain Day: mean > 0.6 or p95 > 2, whichever was kept
-    bool disordered;                 // red's x, green's Y or blue's Z is not the largest of the
-                                     // three: columns exchanged?
-    bool drifted;                    // white moved by more than 3 % while measuring
+    struct display_uncertainty uncertainty; // of the kept model's predictions
+    bool primaries;                         // red, green, blue, white and black were all measured
+    double additivity;                      // luminance of R + G + B - 2 black over white, less 1
+    bool ill_conditioned;                   // condition > 10: noise grows tenfold
+    bool misfit;                            // plain Day: mean > 0.6 or p95 > 2, whichever was kept
+    bool disordered; // red's x, green's Y or blue's Z is not the largest of the
+                     // three: columns exchanged?
+    bool drifted;    // white moved by more than 3 % while measuring
 };
 
 // Fits and prepares model (its name from the measurements): the kind *only, or

@@ -92,6 +92,9 @@ static json_t *warnings(const struct measurements *m, const struct display_model
                 "%s: white drifted by %.1f %% over %d readings (sound below 3 %%): warm the panel "
                 "up and measure again",
                 m->path, 100 * m->white_drift, m->whites);
+    if (*f->not_validated)
+        warning(list, "%s: %s was kept without cross-validation: %s", m->path,
+                display_kind_names[model->kind], f->not_validated);
     if (!m->absolute)
         warning(list, "%s: no LUMINANCE_XYZ_CDM2: white is taken as %.5g cd/m2", m->path,
                 m->white.Y);
@@ -135,6 +138,28 @@ static void print_candidate(const struct display_choice *choice, int kind)
                                                               : "not significant");
 }
 
+static void print_choice(const struct display_model *model, const struct display_fit *f,
+                         bool automatic)
+{
+    if (*f->not_validated) {
+        printf("model %s, not cross-validated: %s\n", display_kind_names[model->kind],
+               f->not_validated);
+        return;
+    }
+    printf("model %s%s; mean CIEDE2000 of %d patches that the fit did not see:\n",
+           display_kind_names[model->kind],
+           automatic ? ", the simplest that is not significantly worse than the best" : "",
+           f->choice.scored);
+    for (int k = 0; k < DISPLAY_KIND_COUNT; k++)
+        print_candidate(&f->choice, k);
+}
+
+static double uncertainty_at(const struct display_model *model, const struct display_fit *f,
+                             double grey)
+{
+    return display_uncertainty_de00(&f->uncertainty, model, (struct counts){grey, grey, grey});
+}
+
 static void print_found(const struct measurements *m, const struct display_model *model,
                         const struct display_fit *f, bool automatic)
 {
@@ -144,12 +169,11 @@ static void print_found(const struct measurements *m, const struct display_model
     printf(
         "white %.5g cd/m2, black %.3g cd/m2, condition number %.2f, %d of %d curve nodes pooled\n",
         m->white.Y, black.Y, model->condition, f->pooled, 3 * DISPLAY_NODES);
-    printf("model %s%s; mean CIEDE2000 of %d patches that the fit did not see:\n",
-           display_kind_names[model->kind],
-           automatic ? ", the simplest that is not significantly worse than the best" : "",
-           f->choice.scored);
-    for (int k = 0; k < DISPLAY_KIND_COUNT; k++)
-        print_candidate(&f->choice, k);
+    print_choice(model, f, automatic);
+    printf("standard uncertainty of a prediction in CIEDE2000: %.3f at white, %.3f at middle grey, "
+           "%.3f at dark grey\n",
+           uncertainty_at(model, f, 1), uncertainty_at(model, f, 0.5),
+           uncertainty_at(model, f, 0.15));
 }
 
 static json_t *summary_facts(const struct summary *s)
@@ -175,20 +199,31 @@ static json_t *candidate_facts(const struct display_choice *choice)
     return all;
 }
 
+static json_t *uncertainty_facts(const struct display_model *model, const struct display_fit *f)
+{
+    const struct display_uncertainty *u = &f->uncertainty;
+    return json_pack("{s:i,s:f,s:f,s:f,s:f,s:f,s:{s:f,s:f,s:f}}", "modes", u->modes, "smooth_de00",
+                     u->smooth_de00, "length_lab", u->length_lab, "local_de00", u->local_de00,
+                     "neutral_de00", u->neutral_de00, "noise_de00", u->noise_de00, "de00", "white",
+                     uncertainty_at(model, f, 1), "middle_grey", uncertainty_at(model, f, 0.5),
+                     "dark_grey", uncertainty_at(model, f, 0.15));
+}
+
 // Takes over list.
 static void print_json(const struct measurements *m, const struct display_model *model,
                        const struct display_fit *f, json_t *list)
 {
     struct xyz black = display_black(model);
     json_t *facts = json_pack(
-        "{s:s,s:i,s:o,s:o,s:{s:s,s:s,s:i,s:i,s:o},s:[f,f,f],s:[f,f,f],s:f,s:f,s:i,s:i,s:o}",
+        "{s:s,s:i,s:o,s:o,s:{s:s,s:s,s:i,s:i,s:o},s:o,s:[f,f,f],s:[f,f,f],s:f,s:f,s:i,s:i,s:o}",
         "model", display_kind_names[model->kind], "patches", f->patches, "de00",
         summary_facts(&f->de00), "de00_day", summary_facts(&f->day), "cross_validation", "kept",
         display_kind_names[f->choice.kind], "best", display_kind_names[f->choice.best], "folds",
         DISPLAY_FOLDS, "patches", f->choice.scored, "candidates", candidate_facts(&f->choice),
-        "white_cdm2", m->white.X, m->white.Y, m->white.Z, "black_cdm2", black.X, black.Y, black.Z,
-        "condition", model->condition, "white_drift", m->white_drift, "pooled", f->pooled,
-        "iterations", f->iterations, "warnings", list);
+        "uncertainty", uncertainty_facts(model, f), "white_cdm2", m->white.X, m->white.Y,
+        m->white.Z, "black_cdm2", black.X, black.Y, black.Z, "condition", model->condition,
+        "white_drift", m->white_drift, "pooled", f->pooled, "iterations", f->iterations, "warnings",
+        list);
     json_dumpf(facts, stdout, JSON_REAL_PRECISION(9) | JSON_INDENT(1));
     putchar('\n');
     json_decref(facts);
@@ -204,6 +239,7 @@ static struct display_origin origin_of(const struct measurements *m, const struc
     snprintf(o.date, sizeof o.date, "%s", m->created);
     snprintf(o.software, sizeof o.software, "boothcal %s", BOOTHD_VERSION);
     snprintf(o.source, sizeof o.source, "%s", m->path);
+    o.uncertainty = f->uncertainty;
     return o;
 }
 

@@ -197,3 +197,26 @@ double ridge_freedom(const struct ridge *r, double penalty)
 {
     return (r->d.array() / (r->d.array() + penalty)).sum();
 }
+
+void ridge_covariance(const struct ridge *r, double penalty, double *covariance)
+{
+    Eigen::VectorXd shrink = (r->d.array() + penalty).inverse();
+    Eigen::Map<Matrix>(covariance, r->q.rows(), r->q.rows()) =
+        r->q * shrink.asDiagonal() * r->q.transpose();
+}
+
+bool principal_modes(const double *covariance, int n, int count, double *modes, struct error *err)
+try {
+    Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(
+        Eigen::Map<const Matrix>(covariance, n, n));
+    if (solver.info() != Eigen::Success)
+        return fail(err, ERROR_DATA, "no principal modes of a covariance of %d", n);
+    for (int k = 0; k < count; k++) {
+        const int from = n - 1 - k; // eigenvalues rise
+        Eigen::Map<Eigen::VectorXd>(modes + static_cast<long>(k) * n, n) =
+            std::sqrt(std::fmax(0, solver.eigenvalues()[from])) * solver.eigenvectors().col(from);
+    }
+    return true;
+} catch (const std::exception &e) {
+    return fail(err, ERROR_SYSTEM, "no principal modes: %s", e.what());
+}

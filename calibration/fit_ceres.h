@@ -71,6 +71,15 @@ void ridge_left_out(const struct ridge *ridge, double penalty, double *predicted
 // How many unknowns the rows decide: the trace of the hat matrix.
 double ridge_freedom(const struct ridge *ridge, double penalty);
 
+// (design' weight design + penalty)^-1, unknowns x unknowns: the covariance of c
+// for values of variance 1 / weight.
+void ridge_covariance(const struct ridge *ridge, double penalty, double *covariance);
+
+// The `count` largest principal modes of an n x n covariance, each an eigenvector
+// times the root of its eigenvalue, count x n; largest first. Source: Pearson
+// 1901 (Phil. Mag. 2, 559-572).
+bool principal_modes(const double *covariance, int n, int count, double *modes, struct error *err);
+
 #ifdef __cplusplus
 }
 #endif

@@ -20,12 +20,13 @@ enum { PENALTIES = 19, ROUNDS = 2, SIDE = 9, TERMS = 100 };
 struct fit {
     const struct measurements *m;
     struct display_model *model;
-    struct lattice box;    // its corners
-    double *prior;         // LATTICE_NODES x TERMS: factor of the prior covariance
-    double *design;        // patches x TERMS, on the prior's factor
-    double (*apart)[3];    // measured less predicted, CIELAB
-    struct lab *measured;  // CIELAB
-    struct lab *predicted; // CIELAB
+    const struct residual_spread *spread; // or NULL
+    struct lattice box;                   // its corners
+    double *prior;                        // LATTICE_NODES x TERMS: factor of the prior covariance
+    double *design;                       // patches x TERMS, on the prior's factor
+    double (*apart)[3];                   // measured less predicted, CIELAB
+    struct lab *measured;                 // CIELAB
+    struct lab *predicted;                // CIELAB
     double *weight;
     double (*left_out)[3];
     double *de00;
@@ -218,15 +219,57 @@ static void lay(const struct fit *f, const struct ridge *ridge, double penalty,
                 model->residual.node[k][n] += f->prior[k * TERMS + j] * c[j][n];
 }
 
+// Variance of a reading in CIEDE2000 units, from what the fit left.
+static double noise_variance(const struct fit *f, const struct display_model *model, double freedom)
+{
+    double sum = 0;
+    for (int i = 0; i < f->m->count; i++) {
+        struct lab now = lab_in(f, display_forward(model, f->m->patches[i].counts));
+        double apart = delta_e_ab(f->measured[i], now);
+        sum += f->weight[i] * apart * apart / 3;
+    }
+    return sum / fmax(f->m->count - freedom, 1);
+}
+
+// The shifts of L*, a* and b* are alike uncertain and independent.
+static bool find_spread(const struct fit *f, const struct ridge *ridge, double penalty,
+                        double variance, struct error *err)
+{
+    const int n = f->spread->n;
+    double *inner = malloc(sizeof(double) * TERMS * TERMS);
+    double *rows = malloc(sizeof(double) * TERMS * (size_t)n);
+    bool ok = (inner && rows) || fail(err, ERROR_SYSTEM, "out of memory for a covariance");
+    for (int i = 0; ok && i < n; i++)
+        design_row(f, lab_in(f, display_forward(f->model, f->spread->counts[i])), rows + i * TERMS);
+    if (ok)
+        ridge_covariance(ridge, penalty, inner);
+    memset(f->spread->covariance, 0, sizeof(double) * 9 * (size_t)n * (size_t)n);
+    for (int i = 0; ok && i < n; i++)
+        for (int j = 0; j < n; j++) {
+            double sum = 0;
+            for (int k = 0; k < TERMS; k++)
+                for (int l = 0; l < TERMS; l++)
+                    sum += rows[i * TERMS + k] * inner[k * TERMS + l] * rows[j * TERMS + l];
+            for (int c = 0; c < 3; c++)
+                f->spread->covariance[(3 * i + c) * 3 * n + 3 * j + c] = variance * sum;
+        }
+    free(inner);
+    free(rows);
+    return ok;
+}
+
 static bool settle(const struct fit *f, const struct ridge *ridge, int from,
                    struct residual_fit *found, struct error *err)
 {
     struct display_model model = *f->model;
     for (int k = from; k < PENALTIES; k++) {
-        lay(f, ridge, penalty_of(k), &model);
+        const double penalty = penalty_of(k), freedom = ridge_freedom(ridge, penalty);
+        lay(f, ridge, penalty, &model);
         if (!display_model_prepare(&model, err))
             continue;
-        *found = (struct residual_fit){penalty_of(k), ridge_freedom(ridge, penalty_of(k))};
+        if (f->spread && !find_spread(f, ridge, penalty, noise_variance(f, &model, freedom), err))
+            return false;
+        *found = (struct residual_fit){penalty, freedom};
         *f->model = model;
         return true;
     }
@@ -250,9 +293,10 @@ static bool solve(struct fit *f, struct residual_fit *found, struct error *err)
 }
 
 bool residual_fit(const struct measurements *m, struct display_model *model,
-                  struct residual_fit *found, struct error *err)
+                  struct residual_fit *found, const struct residual_spread *spread,
+                  struct error *err)
 {
-    struct fit f = {.m = m, .model = model};
+    struct fit f = {.m = m, .model = model, .spread = spread};
     bool ok = take_room(&f, err);
     if (ok) {
         find_box(&f);

@@ -15,6 +15,14 @@
 
 #include "calibration/measurements.h"
 
+// Where the covariance of the shift is wanted: of L*, a*, b* at n counts, 3n x
+// 3n, filled by the fit.
+struct residual_spread {
+    const struct counts *counts;
+    int n;
+    double *covariance;
+};
+
 struct residual_fit {
     double penalty; // noise variance (dE00^2) over prior variance (CIELAB^2)
     double freedom; // terms that the patches decide
@@ -22,8 +30,9 @@ struct residual_fit {
 
 // Makes a prepared DAY model a prepared RESIDUAL one. Where the residual that
 // predicts best would fold, a larger penalty is taken. DATA when none will do;
-// model is untouched then.
+// model is untouched then. spread may be NULL.
 bool residual_fit(const struct measurements *m, struct display_model *model,
-                  struct residual_fit *found, struct error *err);
+                  struct residual_fit *found, const struct residual_spread *spread,
+                  struct error *err);
 
 #endif

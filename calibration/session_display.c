@@ -79,6 +79,7 @@ static bool fit_model(struct session *s, const char *verify_path, struct error *
     d->black = display_black(&model);
     origin.fit_mean_de00 = found.de00.mean;
     origin.fit_max_de00 = found.de00.max;
+    origin.uncertainty = found.uncertainty;
     return display_save(d->model, &model, &origin, err);
 }
 

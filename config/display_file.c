@@ -8,6 +8,14 @@
 #include "files/ini.h"
 #include "files/write.h"
 
+// A line of the file holds a mode along blue.
+enum {
+    LINES_A_MODE = UNCERTAINTY_SIDE * UNCERTAINTY_SIDE,
+    MODE_LINES = UNCERTAINTY_MODES * LINES_A_MODE,
+    LINE_NUMBERS = 3 * UNCERTAINTY_SIDE,
+    UNCERTAINTY_ROWS = 6,
+};
+
 // What the file holds: the model with its curves and its residual node by node.
 struct display_file {
     char name[128];
@@ -21,6 +29,8 @@ struct display_file {
     char node_names[DISPLAY_NODES][12];
     struct setting shift_rows[2 + LATTICE_NODES + 1];
     char shift_names[LATTICE_NODES][12];
+    struct setting mode_rows[UNCERTAINTY_ROWS + MODE_LINES + 1];
+    char mode_names[MODE_LINES][12];
 };
 
 #define TEXT(in, field, preset_text, sentence)                                                     \
@@ -104,6 +114,53 @@ static const struct setting origin_rows[] = {
     {0},
 };
 
+#define DEVIATION(field, range, value, sentence)                                                   \
+    {                                                                                              \
+        .name = #field, .type = SETTING_DOUBLE,                                                    \
+        .offset = SETTING_FIELD(struct display_uncertainty, field), .least = 0, .most = range,     \
+        .unit = "", .preset = value, .help = sentence                                              \
+    }
+
+static const struct setting uncertainty_rows[UNCERTAINTY_ROWS] = {
+    DEVIATION(smooth_de00, 1000, "0",
+              "Standard deviation a CIEDE2000 axis that neighbouring colours share."),
+    DEVIATION(length_lab, 1000, "0", "CIELAB units over which they share it."),
+    DEVIATION(local_de00, 1000, "0",
+              "Standard deviation a CIEDE2000 axis that neighbouring colours do not share."),
+    DEVIATION(neutral_de00, 1000, "0", "Likewise, in addition, near the grey axis."),
+    DEVIATION(noise_de00, 1000, "0", "Of that, repeatability of one reading; 0 when not known."),
+    {.name = "modes",
+     .type = SETTING_INT,
+     .offset = SETTING_FIELD(struct display_uncertainty, modes),
+     .least = 0,
+     .most = UNCERTAINTY_MODES,
+     .unit = "",
+     .preset = "0",
+     .help = "Principal modes of the parameters' covariance."},
+};
+
+// Names only the modes that there are, or all to read a file.
+static void name_modes(struct display_file *file, int modes)
+{
+    const size_t first = offsetof(struct display_uncertainty, mode);
+    memcpy(file->mode_rows, uncertainty_rows, sizeof uncertainty_rows);
+    for (int k = 0; k < modes * LINES_A_MODE; k++) {
+        snprintf(file->mode_names[k], sizeof file->mode_names[k], "mode_%02d_%d%d",
+                 k / LINES_A_MODE, k / UNCERTAINTY_SIDE % UNCERTAINTY_SIDE, k % UNCERTAINTY_SIDE);
+        file->mode_rows[UNCERTAINTY_ROWS + k] = (struct setting){
+            .name = file->mode_names[k],
+            .type = SETTING_VECTOR,
+            .offset = first + LINE_NUMBERS * sizeof(double) * (size_t)k,
+            .size = LINE_NUMBERS,
+            .least = -1000,
+            .most = 1000,
+            .unit = "",
+            .preset = "0 0 0 0 0 0 0 0 0 0 0 0",
+            .help = "L*, a*, b* per standard deviation at a third of red and of green, for "
+                    "blue 0, 1/3, 2/3, 1."};
+    }
+}
+
 static void name_shifts(struct display_file *file)
 {
     memcpy(file->shift_rows, corner_rows, sizeof corner_rows);
@@ -148,34 +205,29 @@ static struct display_file *file_create(struct error *err)
     return file;
 }
 
-enum { SECTIONS = 7 };
+enum { SECTIONS = 8 };
 
-static void sections_of(struct display_file *file, struct settings_section sections[SECTIONS])
+// Every section, or those that the kind uses and that say something.
+static void sections_of(struct display_file *file, bool every,
+                        struct settings_section sections[SECTIONS])
 {
-    sections[0] = (struct settings_section){"display", name_rows, file};
-    sections[1] = (struct settings_section){"origin", origin_rows, &file->origin};
-    sections[2] = (struct settings_section){"matrix", matrix_rows, file->matrix};
-    sections[3] = (struct settings_section){"curves", file->node_rows, file->nodes};
-    sections[4] = (struct settings_section){"interaction", interaction_rows, file->interaction};
-    sections[5] = (struct settings_section){"residual", file->shift_rows, &file->residual};
-    sections[6] = (struct settings_section){0};
-}
-
-// Drops the sections that the kind does not use.
-static void keep_used(enum display_kind kind, struct settings_section sections[SECTIONS])
-{
-    switch (kind) {
-    case DISPLAY_DAY:
-        sections[4] = sections[6];
-        break;
-    case DISPLAY_INTERACTION:
-        sections[5] = sections[6];
-        break;
-    case DISPLAY_RESIDUAL:
-        sections[4] = sections[5];
-        sections[5] = sections[6];
-        break;
-    }
+    const struct display_uncertainty *u = &file->origin.uncertainty;
+    bool uncertain = u->modes > 0 || u->smooth_de00 > 0 || u->local_de00 > 0 || u->neutral_de00 > 0;
+    int n = 0;
+    name_modes(file, every ? UNCERTAINTY_MODES : u->modes);
+    sections[n++] = (struct settings_section){"display", name_rows, file};
+    sections[n++] = (struct settings_section){"origin", origin_rows, &file->origin};
+    sections[n++] = (struct settings_section){"matrix", matrix_rows, file->matrix};
+    sections[n++] = (struct settings_section){"curves", file->node_rows, file->nodes};
+    if (every || file->kind == DISPLAY_INTERACTION)
+        sections[n++] =
+            (struct settings_section){"interaction", interaction_rows, file->interaction};
+    if (every || file->kind == DISPLAY_RESIDUAL)
+        sections[n++] = (struct settings_section){"residual", file->shift_rows, &file->residual};
+    if (every || uncertain)
+        sections[n++] =
+            (struct settings_section){"uncertainty", file->mode_rows, &file->origin.uncertainty};
+    sections[n] = (struct settings_section){0};
 }
 
 // Other programs' texts may hold what an INI value cannot.
@@ -210,8 +262,7 @@ bool display_save(const char *path, const struct display_model *model,
                      file->origin.source};
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
         make_plain(texts[i]);
-    sections_of(file, sections);
-    keep_used(model->kind, sections);
+    sections_of(file, false, sections);
     bool saved = ini_save(path, sections, err);
     free(file);
     return saved;
@@ -287,7 +338,7 @@ bool display_load(const char *path, struct display_model *model, struct display_
     struct display_file *file = file_create(err);
     if (!file)
         return false;
-    sections_of(file, sections);
+    sections_of(file, true, sections);
     bool fine = ini_load(path, sections, err);
     model_of(file, &loaded);
     if (fine && !display_model_prepare(&loaded, err))

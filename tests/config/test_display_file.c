@@ -147,6 +147,27 @@ static void every_kind_is_kept_to_the_last_bit(void **state)
     check_kept(&m);
 }
 
+static void the_uncertainty_is_kept_with_the_modes_there_are(void **state)
+{
+    (void)state;
+    struct display_model m = interacting(), loaded = {0};
+    struct display_origin from = origin, back = {0};
+    struct error err = {0};
+    from.uncertainty = (struct display_uncertainty){.modes = 3,
+                                                    .smooth_de00 = 0.12,
+                                                    .length_lab = 16,
+                                                    .local_de00 = 0.08,
+                                                    .neutral_de00 = 0.05,
+                                                    .noise_de00 = 0.02};
+    for (int k = 0; k < 3; k++)
+        for (int p = 0; p < UNCERTAINTY_PLACES; p++)
+            for (int n = 0; n < 3; n++)
+                from.uncertainty.mode[k][p][n] = (100 * k + p - 30 * n) * 1e-4;
+    assert_true(display_save(path, &m, &from, &err));
+    assert_true(display_load(path, &loaded, &back, &err));
+    assert_memory_equal(&back, &from, sizeof back);
+}
+
 static void a_file_without_a_model_key_is_plain_day(void **state)
 {
     (void)state;
@@ -236,6 +257,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_saved_is_loaded_to_the_last_bit),
         cmocka_unit_test(every_kind_is_kept_to_the_last_bit),
+        cmocka_unit_test(the_uncertainty_is_kept_with_the_modes_there_are),
         cmocka_unit_test(a_file_without_a_model_key_is_plain_day),
         cmocka_unit_test(an_addition_that_folds_is_refused_by_its_section),
         cmocka_unit_test(texts_an_ini_cannot_hold_are_made_plain),
