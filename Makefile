@@ -59,7 +59,7 @@ FAULTS   := $(wildcard tests/whole/faults_*.c)
 SHADERS  := $(wildcard render/shaders/*.glsl colorimetry/*.glsl)
 object    = $(patsubst %,$(BUILD)/%.o,$(basename $(1)))
 
-.PHONY: FORCE all deps demo check check-here faults bench format layers links made install install-only uninstall clean
+.PHONY: FORCE all deps demo session check check-here faults bench format layers links made install install-only uninstall clean
 .SECONDARY:
 
 all: $(PROGRAMS:%=$(BUILD)/%) made
@@ -148,6 +148,12 @@ demo:
 
 faults: all $(LONG)
 	BUILD=$(BUILD) tests/run.sh $(BUILD)/faults.results --together $(LONG)
+
+# A technician's whole session, from bare settings to a sealed report.
+session:
+	@$(MAKE) -s deps
+	$(MAKE) all
+	BUILD=$(BUILD) calibration/demo.sh --whole $(BUILD)/session
 
 bench: $(BUILD)/tests/bench/bench
 	$< $(BUILD)/bench.json

@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 # The main job on emulated instruments: boothsim brings up the booth, boothd
 # runs against it, boothcal works through a session.
-#   demo.sh FOLDER [OPTION...]   results go to FOLDER, options to boothcal session;
-#                                programs come from $BUILD (build)
+#   demo.sh FOLDER [OPTION...]           results go to FOLDER, options to boothcal session;
+#                                        programs come from $BUILD (build)
+#   demo.sh --whole FOLDER [OPTION...]   from bare settings: also finds where screen, inclinometer and
+#                                        camera are, photographs the ceiling under each lamp, and audits
 # LAMP_A, LAMP_D50, LAMP_D65 replace a lamp's spectrum: a CIE name or a file.
 set -eu
 
@@ -37,6 +39,13 @@ if [ "$1" = --inside ]; then
         fi
         sleep 0.2
     done
+    booth="--config $run/boothd.conf --socket $run/boothd.sock --booth $run/boothsim.sock"
+    if [ -e "$run/whole" ]; then
+        # shellcheck disable=SC2086
+        "$programs/boothcal" tilt $booth --store --keep "$out/poses.csv"
+        # shellcheck disable=SC2086
+        "$programs/boothcal" tracker $booth --store --keep "$out/points.csv"
+    fi
     for lamp in $lamps; do set -- "$@" --lamp "$lamp=$(spectrum_of $lamp)"; done
     status=0
     "$programs/boothcal" session --config "$run/boothd.conf" --socket "$run/boothd.sock" \
@@ -48,20 +57,34 @@ if [ "$1" = --inside ]; then
         --booth "$run/boothsim.sock" --patches 4 --published-mean 2 --published-max 5 \
         --out "$out/verify.json" || verified=$?
     [ $verified = 0 ] || [ $verified = 3 ] || exit $verified
+    if [ -e "$run/whole" ]; then
+        "$programs/boothcal" audit --lamps "$(ls -d "$run"/store/*/*/current)/lamps" -o "$out/audit.json" ||
+            [ $? = 3 ]
+        "$programs/boothcal" report --check "$out/report.json" "$out/report.txt" "$out/report.html" \
+            "$out/verify.json" "$out/audit.json"
+        # shellcheck disable=SC2086
+        "$programs/boothcal" history --config "$run/boothd.conf" --verify
+    fi
     "$programs/boothctl" --socket "$run/boothd.sock" quit >/dev/null
     wait "$daemon"
     daemon=
     exit $status
 fi
 
+whole=
+[ "$1" != --whole ] || { whole=yes; shift; }
 mkdir -p "$1"
 out=$(cd "$1" && pwd)
 shift
 run=$out/run
 rm -rf "$run"
 mkdir -p "$run"
+# What a technician measures first is not in the settings then.
+[ -z "$whole" ] || touch "$run/whole"
+measured=${whole:+-e /^hinge_m/d -e /^centre_from_hinge_m/d -e /^place_m/d -e /^pitch_deg/d}
 # Lamps and display model come from the store, which the session fills.
-sed -e '/^folder = lamps$/d' -e 's|^model = display.ini$|serial = emulated panel EMU001|' \
+# shellcheck disable=SC2086
+sed $measured -e '/^folder = lamps$/d' -e 's|^model = display.ini$|serial = emulated panel EMU001|' \
     "$root/config/booths/emulated.conf" >"$run/boothd.conf"
 cat >>"$run/boothd.conf" <<END
 [calibration]

@@ -14,6 +14,7 @@
 #include "calibration/commands.h"
 #include "calibration/facts_json.h"
 #include "calibration/report.h"
+#include "calibration/store_keep.h"
 #include "config/paths.h"
 
 static const char USAGE[] =
@@ -154,9 +155,18 @@ static void say(const struct session *s, const char *text)
         fprintf(stderr, "%s\n", text);
 }
 
+// Wherever screen and head were left.
+static bool rest(struct session *s, struct error *err)
+{
+    return bench_tilt(&s->bench, s->settings.stand.default_tilt_deg, err) &&
+           bench_head(&s->bench, session_eye(s), err);
+}
+
 static bool steps(struct session *s, struct error *err)
 {
     struct session_facts *f = s->facts;
+    if (!rest(s, err))
+        return false;
     say(s, "Teaching the lamps");
     for (int i = 0; i < f->lamp_count; i++) {
         if (!session_teach(s, i, err))
@@ -204,7 +214,8 @@ static bool write_report(const struct session *s, struct error *err)
 static bool run(struct session *s, const struct options *o, struct error *err)
 {
     int64_t began = clock_now_ns();
-    if (!booth_load(o->config, NULL, 0, &s->settings, err) || !begin(s, o, err) || !steps(s, err))
+    bool placed;
+    if (!store_settings(o->config, &s->settings, &placed, err) || !begin(s, o, err) || !steps(s, err))
         return false;
     s->facts->emulated = bench_emulated(&s->bench) ||
                          json_is_true(json_object_get(s->facts->settings, "emulated"));

@@ -8,6 +8,7 @@
 
 #include "base/number.h"
 #include "calibration/commands.h"
+#include "calibration/store_keep.h"
 #include "calibration/view_measure.h"
 
 static const double LEFT_WARN_DE00 = 1;
@@ -118,11 +119,12 @@ static int parse(int argc, char **argv, struct options *o)
 static bool live(const struct options *o, struct view_measured *m, struct error *err)
 {
     char journal[1024];
+    bool placed;
     struct bench bench = {0};
     struct booth_settings *settings = calloc(1, sizeof *settings);
     snprintf(journal, sizeof journal, "%s.journal", o->out);
     bool fine = settings || fail(err, ERROR_SYSTEM, "out of memory");
-    fine = fine && booth_load(o->config, NULL, 0, settings, err) &&
+    fine = fine && store_settings(o->config, settings, &placed, err) &&
            bench_open(&bench, settings, o->socket, o->booth, err) &&
            bench_lamp(&bench, "none", err) && bench_await_lamp(&bench, "", 30, err) &&
            view_measured(&bench, settings, &o->plan, journal, m, err);
