@@ -3,6 +3,7 @@
 
 #include <math.h>
 #include <poll.h>
+#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -21,6 +22,7 @@ struct desk {
     struct acquire *instruments;
     struct jobs *jobs;
     pthread_t thread;
+    bool started;
     pthread_mutex_t lock; // of stop and report
     bool stop;
     struct instrument_report report;
@@ -267,7 +269,7 @@ static void raw(struct desk *d, struct job *job)
     free(series);
 }
 
-static void do_job(struct desk *d, struct job *job)
+void desk_do(struct desk *d, struct job *job)
 {
     switch (job->kind) {
     case JOB_MEASURE:
@@ -299,7 +301,7 @@ static void *work(void *argument)
         poll(&waiting, 1, LOOK_EVERY_MS);
         if (!jobs_take(d->jobs, &job))
             continue;
-        do_job(d, &job);
+        desk_do(d, &job);
         jobs_finish(d->jobs, &job);
     }
     return NULL;
@@ -314,8 +316,8 @@ static void free_desk(struct desk *d)
     free(d);
 }
 
-struct desk *desk_open(const struct booth_settings *settings, struct acquire *instruments,
-                       struct error *err)
+struct desk *desk_create(const struct booth_settings *settings, struct acquire *instruments,
+                         struct error *err)
 {
     struct desk *d = calloc(1, sizeof *d);
     if (!d) {
@@ -330,10 +332,22 @@ struct desk *desk_open(const struct booth_settings *settings, struct acquire *in
     if (d->driver)
         snprintf(d->report.driver, sizeof d->report.driver, "%s", d->driver->name);
     d->jobs = jobs_create(err);
-    if (d->jobs && !pthread_create(&d->thread, NULL, work, d))
-        return d;
     if (d->jobs)
-        fail(err, ERROR_SYSTEM, "no thread for measuring");
+        return d;
+    free_desk(d);
+    return NULL;
+}
+
+struct desk *desk_open(const struct booth_settings *settings, struct acquire *instruments,
+                       struct error *err)
+{
+    struct desk *d = desk_create(settings, instruments, err);
+    if (!d)
+        return NULL;
+    d->started = !pthread_create(&d->thread, NULL, work, d);
+    if (d->started)
+        return d;
+    fail(err, ERROR_SYSTEM, "no thread for measuring");
     free_desk(d);
     return NULL;
 }
@@ -346,7 +360,7 @@ bool desk_close(struct desk *d, int64_t deadline_ns)
     pthread_mutex_lock(&d->lock);
     d->stop = true;
     pthread_mutex_unlock(&d->lock);
-    if (pthread_clockjoin_np(d->thread, NULL, CLOCK_MONOTONIC, &until))
+    if (d->started && pthread_clockjoin_np(d->thread, NULL, CLOCK_MONOTONIC, &until))
         return false;
     free_desk(d);
     return true;

@@ -10,9 +10,18 @@
 struct desk;
 
 // The radiometer is opened when first asked for, and kept open. It may be
-// none. instruments is borrowed until desk_close. NULL with err (SYSTEM).
+// none. instruments is borrowed until desk_close; who only measures needs none. NULL with err
+// (SYSTEM).
 struct desk *desk_open(const struct booth_settings *settings, struct acquire *instruments,
                        struct error *err);
+
+// The same without a thread: whoever made it does the jobs, by desk_do.
+struct desk *desk_create(const struct booth_settings *settings, struct acquire *instruments,
+                         struct error *err);
+
+// Does a MEASURE, TEACH or RAW job, within its time-out. The desk's thread, or the
+// only one where it has none.
+void desk_do(struct desk *desk, struct job *job);
 
 // As acquire_stop: false when still inside a reading at deadline_ns.
 bool desk_close(struct desk *desk, int64_t deadline_ns);

@@ -297,24 +297,6 @@ static void no_instruments_need_no_threads(void **state)
     assert_true(acquire_stop(NULL, 0));
 }
 
-static void a_doubt_is_told_once_when_it_lasts_and_once_when_it_is_over(void **state)
-{
-    (void)state;
-    struct doubt d = {0};
-    int64_t now_ns = 7 * NS_PER_S;
-    int lasts = 0, over = 0;
-    for (int i = 0; i < 40; i++) { // a stand that is turned for 4 s
-        assert_int_equal(doubt_step(&d, true, now_ns += 100 * NS_PER_MS), DOUBT_NO_NEWS);
-    }
-    assert_int_equal(doubt_step(&d, false, now_ns += 100 * NS_PER_MS), DOUBT_NO_NEWS);
-    for (int i = 0; i < 600; i++)
-        lasts += doubt_step(&d, true, now_ns += 100 * NS_PER_MS) == DOUBT_LASTS;
-    for (int i = 0; i < 10; i++)
-        over += doubt_step(&d, false, now_ns += 100 * NS_PER_MS) == DOUBT_OVER;
-    assert_int_equal(lasts, 1);
-    assert_int_equal(over, 1);
-}
-
 // ---- series of raw readings ----------------------------------------------------
 
 static struct series found;
@@ -427,7 +409,6 @@ int main(void)
         cmocka_unit_test(a_driver_that_outlasts_its_deadline_is_seen_while_it_does),
         cmocka_unit_test(a_driver_that_hangs_is_not_waited_for_beyond_the_deadline),
         cmocka_unit_test(no_instruments_need_no_threads),
-        cmocka_unit_test(a_doubt_is_told_once_when_it_lasts_and_once_when_it_is_over),
         cmocka_unit_test(a_series_holds_what_was_exposed_after_it_was_asked_for),
         cmocka_unit_test(a_series_of_a_lost_instrument_is_refused_and_it_is_opened_anew),
         cmocka_unit_test(a_series_ends_at_its_deadline_and_with_a_reason),
