@@ -18,7 +18,8 @@ enum {
     BYTE_MS = 50, // between bytes of one reply
     SERIAL_WORDS = 6,
     MOST_FAILURES = 5,
-    PADDINGS = 8, // more than MOST_FAILURES
+    MOST_FAILURES_TCP = 3, // a connection may be dead at its far end alone: only a new one tells
+    PADDINGS = 8,          // more than MOST_FAILURES
 };
 
 #define G_STEP (16.0 / 32768 * 9.80665) // m/s2
@@ -351,8 +352,9 @@ static bool witmotion_read(struct accelerometer *a, int64_t deadline_ns, struct 
     struct tilt_sample sample = {0};
     int64_t asked = clock_now_ns();
     if (!read_map(a, deadline_ns, &sample, err)) {
+        int most = is_tcp(a->options.port) ? MOST_FAILURES_TCP : MOST_FAILURES;
         a->padding = (a->padding + 1) % PADDINGS; // a late answer is to be known by its length
-        if (++a->failures >= MOST_FAILURES && err)
+        if (++a->failures >= most && err)
             err->code = ERROR_GONE;
         return false;
     }
