@@ -243,6 +243,17 @@ static bool cure_blindness(struct tracker *t, int seen, int64_t deadline_ns, str
     return set_up(t, deadline_ns, err);
 }
 
+// The camera may have lost its settings with the mode: that is not the
+// blindness whose pauses grow.
+static void lose_mode(struct tracker *t)
+{
+    if (t->mode_lost)
+        return;
+    t->mode_lost = true;
+    t->blind_ns = clock_now_ns();
+    t->blind_limit_ms = BLIND_MS;
+}
+
 static void narrow(char *out, size_t size, const wchar_t *wide)
 {
     size_t n = 0;
@@ -338,7 +349,7 @@ static bool fresh_blobs(struct tracker *t, int64_t deadline_ns, struct wiimote_f
             return true;
         if (count > 0 && belongs(format, r[0]))
             continue;
-        t->mode_lost = true;
+        lose_mode(t);
         if (!assert_mode(t, err))
             return false;
     }
