@@ -29,7 +29,7 @@ struct pixel {
     double restless;    // times the read noise
 };
 
-struct detector {
+struct detector_model {
     struct detector_options options;
     enum detector_kind_of_pixel kinds[MODEL_PIXELS_MOST];
     struct pixel pixels[MODEL_PIXELS_MOST];
@@ -60,7 +60,7 @@ static double normal_cdf(double x)
     return 0.5 * erfc(-x * M_SQRT1_2);
 }
 
-static void set_weights(const struct detector *d, double p, struct pixel *pixel)
+static void set_weights(const struct detector_model *d, double p, struct pixel *pixel)
 {
     const double *c = d->options.wavelength;
     double nm = polynomial(c, 4, p);
@@ -76,7 +76,7 @@ static void set_weights(const struct detector *d, double p, struct pixel *pixel)
     }
 }
 
-static void set_inverse(struct detector *d)
+static void set_inverse(struct detector_model *d)
 {
     const double *c = d->options.nonlinearity;
     for (int i = 0; i < INVERSE_STEPS + 2; i++) {
@@ -93,7 +93,7 @@ static void set_inverse(struct detector *d)
     }
 }
 
-static double measured(const struct detector *d, double light)
+static double measured(const struct detector_model *d, double light)
 {
     double end = d->unit * INVERSE_END;
     double at = fmin(fmax(light, 0), end) * (INVERSE_STEPS / end);
@@ -104,7 +104,7 @@ static double measured(const struct detector *d, double light)
 }
 
 // Partly covered pixels get from 0.3 to 0.7 of the light.
-static void set_pixel(struct detector *d, int p, const struct detector_zone *zone, int first,
+static void set_pixel(struct detector_model *d, int p, const struct detector_zone *zone, int first,
                       struct noise *noise)
 {
     struct pixel *pixel = &d->pixels[p];
@@ -119,7 +119,7 @@ static void set_pixel(struct detector *d, int p, const struct detector_zone *zon
     pixel->pattern = PATTERN_RAW * noise_normal(noise);
 }
 
-static void set_pixels(struct detector *d, struct noise *noise)
+static void set_pixels(struct detector_model *d, struct noise *noise)
 {
     int active_first = 0, active_count = 0;
     for (const struct detector_zone *z = d->options.zones; z->kind; z++) {
@@ -137,9 +137,9 @@ static void set_pixels(struct detector *d, struct noise *noise)
     }
 }
 
-struct detector *detector_create(const struct detector_options *options)
+struct detector_model *detector_create(const struct detector_options *options)
 {
-    struct detector *d = calloc(1, sizeof(*d));
+    struct detector_model *d = calloc(1, sizeof(*d));
     if (!d)
         return NULL;
     d->options = *options;
@@ -152,7 +152,7 @@ struct detector *detector_create(const struct detector_options *options)
     return d;
 }
 
-void detector_destroy(struct detector *detector)
+void detector_destroy(struct detector_model *detector)
 {
     free(detector);
 }
@@ -168,19 +168,19 @@ static double light_of(const struct pixel *pixel, const struct spectrum *irradia
     return sum;
 }
 
-static double baseline(const struct detector *d, double age_s)
+static double baseline(const struct detector_model *d, double age_s)
 {
     return BASELINE_RAW + WARM_UP_RAW * exp(-age_s / WARM_UP_S) +
            WANDER_RAW * sin(age_s / 97 + d->wander_phase);
 }
 
-static uint16_t converted(const struct detector *d, double raw)
+static uint16_t converted(const struct detector_model *d, double raw)
 {
     return (uint16_t)fmin(fmax(lround(raw), 0), d->options.saturation);
 }
 
 // The counts that light has made of one pixel, before reading.
-static double exposed(const struct detector *d, const struct pixel *pixel, double light,
+static double exposed(const struct detector_model *d, const struct pixel *pixel, double light,
                       double exposure_s, struct noise *noise)
 {
     double counts = light + pixel->dark * exposure_s;
@@ -188,7 +188,7 @@ static double exposed(const struct detector *d, const struct pixel *pixel, doubl
     return measured(d, counts);
 }
 
-void detector_expose(const struct detector *d, const struct spectrum *irradiance,
+void detector_expose(const struct detector_model *d, const struct spectrum *irradiance,
                      double exposure_s, double age_s, struct noise *noise, uint16_t *raw)
 {
     double light[MODEL_PIXELS_MOST] = {0}, mean = 0;

@@ -36,15 +36,15 @@ struct detector_options {
     uint64_t seed;          // of the fixed pattern; readings take their own noise
 };
 
-struct detector;
+struct detector_model;
 
 // NULL when out of memory.
-struct detector *detector_create(const struct detector_options *options);
-void detector_destroy(struct detector *detector);
+struct detector_model *detector_create(const struct detector_options *options);
+void detector_destroy(struct detector_model *detector);
 
 // One exposure to a mean irradiance (W m-2 nm-1) of exposure_s, age_s after
 // power came on. raw gets 0..saturation, one for each pixel.
-void detector_expose(const struct detector *detector, const struct spectrum *irradiance,
+void detector_expose(const struct detector_model *detector, const struct spectrum *irradiance,
                      double exposure_s, double age_s, struct noise *noise,
                      uint16_t *raw);
 

@@ -59,7 +59,7 @@ struct ooi {
     struct ooi_options options;
     const struct ooi_kind *kind;
     enum ooi_upset upset;
-    struct detector *detector;
+    struct detector_model *detector;
     struct noise noise;
     uint8_t descriptors[18 + 9 + 9 + 4 * 7];
     char serial[SLOT_SIZE + 1];
@@ -139,7 +139,7 @@ static void set_descriptors(struct ooi *d)
     }
 }
 
-static struct detector *make_detector(const struct ooi *d)
+static struct detector_model *make_detector(const struct ooi *d)
 {
     struct detector_options detector = {.saturation = d->kind->saturation,
                                         .zones = d->kind->zones,

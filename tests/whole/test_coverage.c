@@ -59,13 +59,13 @@ struct shared {
     struct scenario scenario;
     struct ocean_unit unit;
     struct ocean_axis *axis;
-    struct detector *detectors[LAMPS];
+    struct detector_model *detectors[LAMPS];
     struct uncertainties u;
 };
 
 static struct shared shared;
 
-static struct detector *make_detector(const struct ooi_kind *kind, uint64_t seed)
+static struct detector_model *make_detector(const struct ooi_kind *kind, uint64_t seed)
 {
     struct detector_options o = {.zones = kind->zones,
                                  .full = kind->full,
