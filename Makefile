@@ -56,6 +56,7 @@ SOURCES  := $(filter-out $(MAINS),$(foreach f,$(FOLDERS),$(wildcard $(f)/*.c $(f
 TESTS    := $(wildcard $(FOLDERS:%=tests/%/test_*.c) tests/whole/test_*.c)
 FAKES    := $(wildcard tests/fakes/*.c)
 FAULTS   := $(wildcard tests/whole/faults_*.c)
+DAY      := $(wildcard tests/whole/day_*.c)
 SHADERS  := $(wildcard render/shaders/*.glsl colorimetry/*.glsl)
 object    = $(patsubst %,$(BUILD)/%.o,$(basename $(1)))
 
@@ -113,9 +114,10 @@ $(foreach p,$(PROGRAMS),$(eval $(call program_rule,$(p))))
 
 # These alone may see both sides of a wire: drivers and simulator.
 $(BUILD)/tests/whole/%: $(BUILD)/tests/whole/%.o $(call object,$(FAKES)) $(call archives,$(FOLDERS)) $(PROGRAMS:%=$(BUILD)/%)
-	$(call say,LD $@)$(CC) -o $@ $(filter $(BUILD)/tests/whole/%.o,$^) $(call object,$(FAKES)) $(call libs,$(FOLDERS)) -lcmocka
+	$(call say,LD $@)$(CC) -o $@ $(filter %.o,$^) $(call libs,$(FOLDERS)) -lcmocka
 
 $(BUILD)/tests/whole/faults: $(call object,$(FAULTS))
+$(BUILD)/tests/whole/test_day: $(call object,$(DAY))
 
 $(call object,render/program.c): $(BUILD)/render/shaders_embedded.inc
 
@@ -217,4 +219,4 @@ uninstall:
 clean:
 	rm -rf build
 
--include $(patsubst %,$(BUILD)/%.d,$(basename $(SOURCES) $(MAINS) $(TESTS) $(FAKES) tests/bench/bench.c $(FAULTS) tests/whole/faults.c tests/whole/soak.c))
+-include $(patsubst %,$(BUILD)/%.d,$(basename $(SOURCES) $(MAINS) $(TESTS) $(FAKES) $(FAULTS) $(DAY) tests/bench/bench.c tests/whole/faults.c tests/whole/soak.c))
