@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The monotonic clock, read by programs only: below them time is an argument.
+// The monotonic clock, read by programs and by drivers, who wait until a deadline;
+// elsewhere time is an argument. A test may answer for it (tests/whole/day.h).
 #ifndef BASE_CLOCK_H
 #define BASE_CLOCK_H
 
