@@ -30,6 +30,22 @@ void budget_fini(struct budget *b)
     *b = (struct budget){0};
 }
 
+struct vec3 budget_residual(const struct xyz *predicted, const struct xyz *measured, int count,
+                            struct xyz white)
+{
+    struct vec3 squares = {0};
+    for (int i = 0; i < count; i++) {
+        struct lab p = {0}, m = {0};
+        lab_of(predicted[i], white, &p, NULL);
+        lab_of(measured[i], white, &m, NULL);
+        struct vec3 off =
+            mat3_apply(de00_metric(p), (struct vec3){m.L - p.L, m.a - p.a, m.b - p.b});
+        squares = vec3_add(squares, (struct vec3){off.x * off.x, off.y * off.y, off.z * off.z});
+    }
+    double n = count > 0 ? count : 1;
+    return (struct vec3){sqrt(squares.x / n), sqrt(squares.y / n), sqrt(squares.z / n)};
+}
+
 enum verdict verdict_of(double value, double expanded, double tolerance)
 {
     if (value + expanded <= tolerance)
@@ -117,6 +133,12 @@ static void add_rounding(struct mat3 by_code, struct random *random, struct xyz 
     *s = (struct xyz){s->X + by.x, s->Y + by.y, s->Z + by.z};
 }
 
+static struct vec3 residual_of(const struct budget_input *in, struct random *random)
+{
+    struct vec3 z = normals(random);
+    return (struct vec3){z.x * in->display_rms.x, z.y * in->display_rms.y, z.z * in->display_rms.z};
+}
+
 // What strikes each reading or each patch by itself.
 static void add_own(const struct work *w, struct streams *streams, struct colours *c)
 {
@@ -128,8 +150,7 @@ static void add_own(const struct work *w, struct streams *streams, struct colour
             break;
         case SCOPE_SHOWN:
             add_rounding(in->patches[i].by_code, &streams->of[CAUSE_QUANTISATION], &c->screen[i]);
-            c->model[i] =
-                vec3_scale(normals(&streams->of[CAUSE_DISPLAY_MODEL]), in->display_rms / sqrt(3));
+            c->model[i] = residual_of(in, &streams->of[CAUSE_DISPLAY_MODEL]);
             break;
         }
     }
@@ -261,16 +282,15 @@ static void bench_fini(struct bench_of_draws *b)
     free(b->again);
 }
 
-// Sums of what each figure is off its estimate by, and of its squares.
+// Sums of the squares of what each figure is off its estimate by.
 static void one_draw(const struct work *w, struct bench_of_draws *b, uint64_t seed, int number,
-                     const double *estimate, double *sum, double *squares)
+                     const double *estimate, double *squares)
 {
     struct streams streams = streams_of(seed, (uint64_t)number);
     draw(w, &streams, &b->c);
     figures_of(w, &b->c, b->figures);
     for (int i = 0; i < figure_count(w->in); i++) {
         double off = b->figures[i] - estimate[i];
-        sum[i] += off;
         squares[i] += off * off;
     }
 }
@@ -299,7 +319,7 @@ static void one_draw_of_each(const struct work *w, struct bench_of_draws *b, uin
 
 struct sums {
     double *room; // CHUNKS times, and once more for all
-    size_t size;  // sum, squares, shares
+    size_t size;  // squares of all causes, then of each drawn anew
 };
 
 static int from_chunk(int draws, int chunk)
@@ -314,9 +334,9 @@ static bool chunk(const struct work *w, int k, int draws, uint64_t seed, const d
     int n = figure_count(w->in), parts = w->in->shares ? draws / ALONE_PART : 0;
     bool fine = bench_make(w, &b);
     for (int d = from_chunk(draws, k); fine && d < from_chunk(draws, k + 1); d++)
-        one_draw(w, &b, seed, d, estimate, room, room + n);
+        one_draw(w, &b, seed, d, estimate, room);
     for (int d = from_chunk(parts, k); fine && d < from_chunk(parts, k + 1); d++)
-        one_draw_of_each(w, &b, seed, d, room + 2 * n);
+        one_draw_of_each(w, &b, seed, d, room + n);
     bench_fini(&b);
     return fine;
 }
@@ -346,15 +366,16 @@ static struct budget_figure *figure(struct budget *b, int frame, int index)
     return of[index % FIGURES_OF_PATCH];
 }
 
-static void take_values(struct budget *b, const double *estimate, const double *sum,
-                        const double *squares)
+// About the stated value, not about the mean of the draws: chroma and total
+// differences near zero are folded, and their mean is not the best estimate.
+static void take_values(struct budget *b, const double *estimate, const double *squares)
 {
     int n = FIGURES_OF_PATCH * b->count + 2;
     for (int f = 0; f < 2; f++) {
         double u[2];
         for (int i = 0; i < n; i++) {
-            double s = sum[f * n + i], value = estimate[f * n + i];
-            double own = sqrt(fmax(squares[f * n + i] - s * s / b->draws, 0) / (b->draws - 1));
+            double value = estimate[f * n + i];
+            double own = sqrt(squares[f * n + i] / b->draws);
             if (i < n - 2)
                 *figure(b, f, i) = (struct budget_figure){.value = value, .u = own};
             else
@@ -382,7 +403,7 @@ static void take_shares(struct budget *b, const double *squares)
 static bool run(const struct work *w, int draws, uint64_t seed, struct budget *b)
 {
     size_t n = (size_t)figure_count(w->in);
-    struct sums sums = {.size = n * (CAUSES + 2)};
+    struct sums sums = {.size = n * (CAUSES + 1)};
     struct bench_of_draws first = {0};
     double *estimate = calloc(n, sizeof *estimate);
     sums.room = calloc(sums.size * (CHUNKS + 1), sizeof *sums.room);
@@ -393,8 +414,8 @@ static bool run(const struct work *w, int draws, uint64_t seed, struct budget *b
         fine = all_draws(w, draws, seed, estimate, &sums);
     }
     if (fine) {
-        take_values(b, estimate, sums.room, sums.room + n);
-        take_shares(b, sums.room + 2 * n);
+        take_values(b, estimate, sums.room);
+        take_shares(b, sums.room + n);
     }
     bench_fini(&first);
     free(estimate);

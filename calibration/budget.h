@@ -104,15 +104,16 @@ struct budget_input {
     double by_tilt;         // d ln lux / d degree
     double by_up, by_near;  // d ln lux / d m
     double eye_angle_deg, eye_distance_m; // SHOWN: from the normal; to the screen
-    double display_rms; // SHOWN: rms dE00 of the display model over patches kept apart
-    double reflectance; // SHOWN: of the screen
-    bool shares;        // wanted; else they are 0
-    int white;          // index of the patch that published differences are divided by
-    int count;          // 1..1024
+    struct vec3 display_rms;              // SHOWN: of the display model; see budget_residual
+    double reflectance;                   // SHOWN: of the screen
+    bool shares;                          // wanted; else they are 0
+    int white; // index of the patch that published differences are divided by
+    int count; // 1..1024
     const struct budget_patch *patches;
 };
 
-// A figure with its standard uncertainty; U = 2 u covers about 95 %.
+// A figure with its standard uncertainty, the rms of the draws about it; U = 2 u
+// covers about 95 %.
 struct budget_figure {
     double value, u;
     double share[CAUSES]; // of the variance: >= 0, sum 1, all 0 when u is 0
@@ -143,6 +144,12 @@ void budget_fini(struct budget *budget);
 // for what lies outside the ranges above, a white that is not positive.
 bool budget_make(const struct budget_input *input, int draws, uint64_t seed, struct budget *out,
                  struct error *err);
+
+// How far a display model is off colours that it was not fitted to: rms of the
+// differences in L*, a* and b*, each over its weight in CIEDE2000 there (the
+// rows of colorimetry/metric.h). white: of CIELAB, positive.
+struct vec3 budget_residual(const struct xyz *predicted, const struct xyz *measured, int count,
+                            struct xyz white);
 
 // Whether a figure keeps to a tolerance, its expanded uncertainty as guard band
 // (JCGM 106:2012): sure to be within, sure to be beyond, or neither.

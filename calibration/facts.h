@@ -77,6 +77,7 @@ struct display_report {
     double white_drift_percent; // largest change of repeated white readings
     double warm_up_s, warm_up_percent_h; // waited for white to stand still; its slope then
     double settle_s;                     // waited after each patch
+    struct vec3 residual;                // over the patches kept apart; see budget_residual
 };
 
 // How the display's light depends on direction and place; see view_fit.h.

@@ -106,6 +106,7 @@ static const struct field display_fields[] = {
     F_NUMBER("warm_up_s", warm_up_s),
     F_NUMBER("warm_up_percent_h", warm_up_percent_h),
     F_NUMBER("settle_s", settle_s),
+    F_NUMBERS("residual_de00_Lab", residual),
     {0},
 };
 #undef OWNER

@@ -104,7 +104,6 @@ static struct budget_input input_of(const struct report *r, const struct lamp_re
                                     const struct report_lamp *lamp, const struct budget_room *room)
 {
     const struct session_facts *f = r->facts;
-    const struct summary *v = &f->display.verification;
     struct rigid pose = stand_pose(&f->place.stand, f->place.tilt_deg);
     struct vec3 to_eye = vec3_sub(f->place.eye, pose.translation);
     struct vec3 normal = mat3_apply(pose.rotation, (struct vec3){0, 0, 1});
@@ -118,7 +117,7 @@ static struct budget_input input_of(const struct report *r, const struct lamp_re
         .eye_distance_m = distance,
         .eye_angle_deg =
             distance > 0 ? acos(fmin(vec3_dot(to_eye, normal) / distance, 1)) * 180 / M_PI : 0,
-        .display_rms = hypot(v->mean, v->std),
+        .display_rms = f->display.residual,
         .reflectance = f->place.reflectance,
         .shares = true,
         .white = from->white_patch,

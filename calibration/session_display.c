@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "calibration/budget.h"
 #include "calibration/display_fit.h"
 #include "calibration/measuring.h"
 #include "calibration/session.h"
@@ -43,6 +44,16 @@ static bool measure(struct session *s, const char *verify_path, struct error *er
     return fine;
 }
 
+static struct vec3 residual_of(const struct measurements *m, const struct display_model *model)
+{
+    struct xyz predicted[VERIFY_MOST], measured[VERIFY_MOST];
+    for (int i = 0; i < m->count; i++) {
+        predicted[i] = display_forward(model, m->patches[i].counts);
+        measured[i] = m->patches[i].xyz;
+    }
+    return budget_residual(predicted, measured, m->count, m->white);
+}
+
 static bool check(struct display_report *d, const struct display_model *model, const char *path,
                   struct error *err)
 {
@@ -51,8 +62,10 @@ static bool check(struct display_report *d, const struct display_model *model, c
         return false;
     double differences[VERIFY_MOST];
     bool fine = apart.count <= VERIFY_MOST && display_differences(&apart, model, differences, err);
-    if (fine)
+    if (fine) {
         d->verification = summarise(differences, apart.count);
+        d->residual = residual_of(&apart, model);
+    }
     measurements_fini(&apart);
     return fine;
 }

@@ -228,16 +228,14 @@ static bool read_patches(struct session *s, int count, const struct display_mode
 // How far the model is off counts when a budget asks for it.
 static void sum_up(const struct verification *v, struct session_facts *f)
 {
-    double de00[VERIFY_PATCHES];
-    const struct xyz white = f->lamps[0].white_reference;
+    struct xyz predicted[VERIFY_PATCHES], measured[VERIFY_PATCHES];
     for (int i = 0; i < v->patch_count; i++) {
-        struct lab a = {0}, b = {0};
-        lab_of(v->patches[i].predicted, white, &a, NULL);
-        lab_of(v->patches[i].measured, white, &b, NULL);
-        de00[i] = delta_e_2000(a, b);
+        predicted[i] = v->patches[i].predicted;
+        measured[i] = v->patches[i].measured;
     }
     f->display.verified = v->patch_count;
-    f->display.verification = summarise(de00, v->patch_count);
+    f->display.residual =
+        budget_residual(predicted, measured, v->patch_count, f->lamps[0].white_reference);
 }
 
 static bool show_all(struct session *s, const struct options *o, struct verification *v,

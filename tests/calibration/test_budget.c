@@ -149,7 +149,7 @@ static void shares_sum_to_one_and_name_only_causes_in_scope(void **state)
     b->in.by_up = 2;
     struct budget measured = made(b);
     b->in.scope = SCOPE_SHOWN;
-    b->in.display_rms = 0.4;
+    b->in.display_rms = (struct vec3){0.2, 0.2, 0.2};
     b->in.reflectance = 0.002;
     struct budget out = made(b);
     for (int i = 0; i < PATCHES; i++) {
@@ -177,7 +177,7 @@ static void a_display_model_off_by_some_dE00_is_that_uncertain(void **state)
     (void)state;
     struct sample_booth *b = booth_of("D65");
     b->in.scope = SCOPE_SHOWN;
-    b->in.display_rms = 0.3;
+    b->in.display_rms = (struct vec3){0.3 / sqrt(3), 0.3 / sqrt(3), 0.3 / sqrt(3)};
     struct budget out = made(b);
     for (int i = 2; i < PATCHES; i++) { // neutrals have no hue to be off in
         const struct budget_difference *d = &out.absolute[i];
@@ -186,6 +186,19 @@ static void a_display_model_off_by_some_dE00_is_that_uncertain(void **state)
     }
     budget_fini(&out);
     free(b);
+}
+
+static void a_residual_of_lightness_alone_is_told_as_such(void **state)
+{
+    (void)state;
+    const struct xyz white = {95, 100, 109}, grey = {19, 20, 21.8}, lighter = {19.4, 20.42, 22.26};
+    struct lab a, b;
+    struct vec3 r = budget_residual(&grey, &lighter, 1, white);
+    assert_true(lab_of(grey, white, &a, NULL) && lab_of(lighter, white, &b, NULL));
+    assert_near(r.x, delta_lch_2000(a, b).L, 0.01 * r.x); // the metric is that of small steps
+    assert_true(r.x > 0.4 && r.y < 0.05 && r.z < 0.05);
+    struct vec3 none = budget_residual(&grey, &grey, 1, white);
+    assert_near(none.x + none.y + none.z, 0, EXACT);
 }
 
 static void twice_the_uncertainties_give_twice_the_uncertainty(void **state)
@@ -386,6 +399,7 @@ int main(void)
         cmocka_unit_test(spectrometer_errors_move_white_as_known),
         cmocka_unit_test(shares_sum_to_one_and_name_only_causes_in_scope),
         cmocka_unit_test(a_display_model_off_by_some_dE00_is_that_uncertain),
+        cmocka_unit_test(a_residual_of_lightness_alone_is_told_as_such),
         cmocka_unit_test(twice_the_uncertainties_give_twice_the_uncertainty),
         cmocka_unit_test(the_same_seed_gives_the_same_budget_on_any_number_of_threads),
         cmocka_unit_test(values_are_the_differences_themselves),

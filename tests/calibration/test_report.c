@@ -107,7 +107,7 @@ static int a_session_of_three_patches(void **state)
                                          .width_m = 0.9,
                                          .depth_m = 0.6,
                                          .bits = 8};
-    facts->display.verification = (struct summary){.n = 9, .mean = 0.3, .std = 0.1};
+    facts->display.residual = (struct vec3){0.1, 0.2, 0.2};
     snprintf(facts->display.model, sizeof facts->display.model, "%s",
              folder_at(&folder, "display.ini"));
     assert_true(display_save(facts->display.model, model, &origin, NULL));
