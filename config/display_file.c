@@ -30,7 +30,7 @@ struct display_file {
     struct setting shift_rows[2 + LATTICE_NODES + 1];
     char shift_names[LATTICE_NODES][12];
     struct setting mode_rows[UNCERTAINTY_ROWS + MODE_LINES + 1];
-    char mode_names[MODE_LINES][12];
+    char mode_names[MODE_LINES][24];
 };
 
 #define TEXT(in, field, preset_text, sentence)                                                     \
@@ -144,7 +144,7 @@ static void name_modes(struct display_file *file, int modes)
 {
     const size_t first = offsetof(struct display_uncertainty, mode);
     memcpy(file->mode_rows, uncertainty_rows, sizeof uncertainty_rows);
-    for (int k = 0; k < modes * LINES_A_MODE; k++) {
+    for (int k = 0; k < modes * LINES_A_MODE && k < MODE_LINES; k++) {
         snprintf(file->mode_names[k], sizeof file->mode_names[k], "mode_%02d_%d%d",
                  k / LINES_A_MODE, k / UNCERTAINTY_SIDE % UNCERTAINTY_SIDE, k % UNCERTAINTY_SIDE);
         file->mode_rows[UNCERTAINTY_ROWS + k] = (struct setting){
