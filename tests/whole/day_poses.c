@@ -28,7 +28,8 @@ static size_t compose(int64_t at_ns, uint8_t bytes[LONG_BYTES])
 {
     const int fault = sender.lane->fault;
     struct vec3 p = sender.head(at_ns);
-    double pose[AXES] = {100 * p.x, 100 * p.y, 100 * p.z, 0, 0, 0}; // cm
+    // In cm; x grows to the observer's left in a picture that is not mirrored.
+    double pose[AXES] = {-100 * p.x, 100 * p.y, 100 * p.z, 0, 0, 0};
     if (fault == DAY_NAN)
         pose[noise_bits(&sender.noise) % AXES] = NAN;
     if (fault == DAY_FAR)
