@@ -150,7 +150,8 @@ static void add_own(const struct work *w, struct streams *streams, struct colour
             break;
         case SCOPE_SHOWN:
             add_rounding(in->patches[i].by_code, &streams->of[CAUSE_QUANTISATION], &c->screen[i]);
-            c->model[i] = residual_of(in, &streams->of[CAUSE_DISPLAY_MODEL]);
+            if (!in->display_modes)
+                c->model[i] = residual_of(in, &streams->of[CAUSE_DISPLAY_MODEL]);
             break;
         }
     }

@@ -104,11 +104,15 @@ struct budget_input {
     double by_tilt;         // d ln lux / d degree
     double by_up, by_near;  // d ln lux / d m
     double eye_angle_deg, eye_distance_m; // SHOWN: from the normal; to the screen
-    struct vec3 display_rms;              // SHOWN: of the display model; see budget_residual
-    double reflectance;                   // SHOWN: of the screen
-    bool shares;                          // wanted; else they are 0
-    int white; // index of the patch that published differences are divided by
-    int count; // 1..1024
+    // SHOWN: of the display model, one of two. Its joint uncertainty: [modes][count] shifts of the
+    // patches' light by one standard deviation each, cd/m2; or, with no modes, its residual.
+    int display_modes;
+    const struct xyz *display_mode;
+    struct vec3 display_rms; // see budget_residual
+    double reflectance;      // SHOWN: of the screen
+    bool shares;             // wanted; else they are 0
+    int white;               // index of the patch that published differences are divided by
+    int count;               // 1..1024
     const struct budget_patch *patches;
 };
 

@@ -331,11 +331,24 @@ static bool add_reflection(struct budget_modes *m, const struct budget_input *in
     return mode;
 }
 
+static bool add_display(struct budget_modes *m, const struct budget_input *in, struct error *err)
+{
+    for (int k = 0; k < in->display_modes; k++) {
+        struct budget_mode *mode = add_mode(m, CAUSE_DISPLAY_MODEL, false, true, err);
+        if (!mode)
+            return false;
+        memcpy(mode->screen, in->display_mode + (size_t)k * in->count,
+               (size_t)in->count * sizeof *mode->screen);
+    }
+    return true;
+}
+
 static bool add_shown(struct budget_modes *m, const struct budget_input *in, struct error *err)
 {
     return in->scope == SCOPE_MEASURED ||
            (add_scalar(m, CAUSE_EYE, 0, by_eye(in), err) &&
-            add_scalar(m, CAUSE_DRIFT, 0, in->u.display_drift, err) && add_reflection(m, in, err));
+            add_scalar(m, CAUSE_DRIFT, 0, in->u.display_drift, err) && add_reflection(m, in, err) &&
+            add_display(m, in, err));
 }
 
 bool budget_modes_make(const struct budget_input *in, struct budget_modes *out, struct error *err)

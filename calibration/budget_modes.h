@@ -7,7 +7,7 @@
 
 #include "calibration/budget.h"
 
-enum { BUDGET_MODES = 96 };
+enum { BUDGET_MODES = 384 };
 
 // One mode, shared by all patches. Sample colours are sums over the lamp's
 // spectrum before they are scaled to the illuminance; index count is the

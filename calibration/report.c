@@ -84,6 +84,14 @@ static bool radiance_of(const json_t *reading, struct spectrum *out)
 struct budget_room {
     struct budget_patch patches[FACTS_PATCHES];
     struct spectrum radiances[FACTS_PATCHES];
+    int modes;
+    struct xyz *mode; // owned
+};
+
+// The display model as its file has it.
+struct known_display {
+    struct display_model model;
+    struct display_origin origin;
 };
 
 // Own findings before presets: the radiometer repeated itself while it looked
@@ -117,6 +125,8 @@ static struct budget_input input_of(const struct report *r, const struct lamp_re
         .eye_distance_m = distance,
         .eye_angle_deg =
             distance > 0 ? acos(fmin(vec3_dot(to_eye, normal) / distance, 1)) * 180 / M_PI : 0,
+        .display_modes = room->modes,
+        .display_mode = room->mode,
         .display_rms = f->display.residual,
         .reflectance = f->place.reflectance,
         .shares = true,
@@ -130,7 +140,7 @@ static struct budget_input input_of(const struct report *r, const struct lamp_re
 }
 
 static void fill_room(const struct report *r, const struct lamp_report *from,
-                      const struct display_model *model, enum budget_scope scope,
+                      const struct known_display *display, enum budget_scope scope,
                       struct budget_room *room)
 {
     const struct session_facts *f = r->facts;
@@ -143,8 +153,10 @@ static void fill_room(const struct report *r, const struct lamp_report *from,
                                    .counts = p->in_gamut};
         if (radiance_of(reading, &room->radiances[i]))
             b->radiance = &room->radiances[i];
-        if (scope == SCOPE_SHOWN && model && !f->place.dither)
-            b->by_code = report_by_code(from, model, p->counts, f->place.bits);
+        if (scope == SCOPE_SHOWN && display)
+            b->screen = report_reached(f, from, &display->model, p->counts);
+        if (scope == SCOPE_SHOWN && display && !f->place.dither)
+            b->by_code = report_by_code(from, &display->model, p->counts, f->place.bits);
     }
 }
 
@@ -166,7 +178,7 @@ static bool load_light(const struct session_facts *f, const struct lamp_report *
     return fine;
 }
 
-static bool make_budgets(struct report *r, int index, const struct display_model *model,
+static bool make_budgets(struct report *r, int index, const struct known_display *display,
                          struct error *err)
 {
     const struct lamp_report *from = &r->facts->lamps[index];
@@ -177,14 +189,17 @@ static bool make_budgets(struct report *r, int index, const struct display_model
     bool fine = r->facts->chart_count == from->patch_count ||
                 fail(err, ERROR_DATA, "the facts have %d reflectances for %d patches",
                      r->facts->chart_count, from->patch_count);
-    fine = fine && load_light(r->facts, from, &lamp->light, err);
+    fine = fine && load_light(r->facts, from, &lamp->light, err) &&
+           (!display || report_display_modes(from, &display->model, &display->origin.uncertainty,
+                                             &room->modes, &room->mode, err));
     for (int scope = SCOPE_MEASURED; fine && scope <= SCOPE_SHOWN; scope++) {
-        fill_room(r, from, model, (enum budget_scope)scope, room);
+        fill_room(r, from, display, (enum budget_scope)scope, room);
         struct budget_input in = input_of(r, from, lamp, room);
         in.scope = (enum budget_scope)scope;
         fine = budget_make(&in, r->draws, SEED + (uint64_t)index,
                            scope == SCOPE_MEASURED ? &lamp->measured : &lamp->shown, err);
     }
+    free(room->mode);
     free(room);
     return fine;
 }
@@ -225,15 +240,15 @@ static void sum_up_outside(const struct lamp_report *from, struct report_lamp *l
     lamp->floor_published = summarise(v[3], lamp->split ? n : 0);
 }
 
-static void make_lamp(struct report *r, int index, const struct display_model *model)
+static void make_lamp(struct report *r, int index, const struct known_display *display)
 {
     const struct lamp_report *from = &r->facts->lamps[index];
     struct report_lamp *lamp = &r->lamps[index];
     struct error why = {0};
-    lamp->budgeted = make_budgets(r, index, model, &why);
+    lamp->budgeted = make_budgets(r, index, display, &why);
     snprintf(lamp->no_budget, sizeof lamp->no_budget, "%.250s", lamp->budgeted ? "" : why.text);
-    if (model)
-        report_steps(r->facts, from, model, lamp);
+    if (display)
+        report_steps(r->facts, from, &display->model, lamp);
     find_worst(from, lamp);
     sum_up_outside(from, lamp);
 }
@@ -241,21 +256,21 @@ static void make_lamp(struct report *r, int index, const struct display_model *m
 bool report_make(const struct session_facts *facts, const char *folder,
                  const char *uncertainty_file, int draws, struct report *out, struct error *err)
 {
-    struct display_model *model = calloc(1, sizeof *model);
+    struct known_display *display = calloc(1, sizeof *display);
     *out = (struct report){.facts = facts, .draws = draws};
-    if (!model)
+    if (!display)
         return fail(err, ERROR_SYSTEM, "out of memory for the report");
     snprintf(out->uncertainty_file, sizeof out->uncertainty_file, "%s",
              uncertainty_file ? uncertainty_file : "");
     if (!uncertainties_load(uncertainty_file, &out->u, err)) {
-        free(model);
+        free(display);
         return false;
     }
     note_inputs(out, folder);
     digest_settings(out);
-    bool there = display_load(facts->display.model, model, NULL, NULL);
+    bool there = display_load(facts->display.model, &display->model, &display->origin, NULL);
     for (int i = 0; i < facts->lamp_count; i++)
-        make_lamp(out, i, there ? model : NULL);
-    free(model);
+        make_lamp(out, i, there ? display : NULL);
+    free(display);
     return true;
 }

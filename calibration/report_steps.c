@@ -2,11 +2,14 @@
 #include "calibration/report_steps.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
+#include "calibration/cholesky.h"
 #include "calibration/proof.h"
 #include "colorimetry/display_view.h"
 
+static const double NEGLIGIBLE = 1e-6;                  // of a variance over the largest
 static const double FIRST_STEP = 0.1, LAST_STEP = 1e-4; // of the search for the closest colour
 
 const char *report_step_name(enum report_step step)
@@ -150,6 +153,66 @@ void report_steps(const struct session_facts *facts, const struct lamp_report *f
     }
     for (int k = 0; k < STEPS; k++)
         lamp->steps[k] = sqrt(squares[k]);
+}
+
+// ---- the model's own uncertainty -----------------------------------------------------
+
+static struct xyz towards_eye(const struct lamp_report *from, const struct display_model *model,
+                              struct xyz at, struct xyz shift)
+{
+    struct view_gains gains;
+    memcpy(gains.c, from->gains, sizeof gains.c);
+    return less(display_view_leaves(model, gains, add(at, shift)),
+                display_view_leaves(model, gains, at));
+}
+
+static int factor(const struct lamp_report *from, const struct display_model *model,
+                  const struct display_uncertainty *uncertainty, double *covariance, double *out,
+                  int rank)
+{
+    struct counts counts[FACTS_PATCHES] = {{0}};
+    int n = from->patch_count;
+    double largest = 0;
+    for (int i = 0; i < n; i++)
+        counts[i] = from->patches[i].counts;
+    display_uncertainty_xyz(uncertainty, model, counts, n, covariance);
+    for (int i = 0; i < 3 * n; i++)
+        largest = fmax(largest, covariance[(size_t)i * 3 * n + i]);
+    return cholesky_pivoted(covariance, 3 * n, rank, NEGLIGIBLE * largest, out);
+}
+
+bool report_display_modes(const struct lamp_report *from, const struct display_model *model,
+                          const struct display_uncertainty *u, int *modes, struct xyz **out,
+                          struct error *err)
+{
+    int n = from->patch_count, rank = 3 * n;
+    *modes = 0;
+    *out = NULL;
+    if (!u->modes && !(u->smooth_de00 > 0) && !(u->local_de00 > 0))
+        return true;
+    double *room = calloc(2 * (size_t)rank * rank, sizeof *room);
+    double *columns = room ? room + (size_t)rank * rank : NULL;
+    *out = calloc((size_t)rank * n, sizeof **out);
+    if (room && *out)
+        *modes = factor(from, model, u, room, columns, rank);
+    for (int i = 0; room && *out && i < n; i++) {
+        struct xyz at = display_forward(model, from->patches[i].counts);
+        for (int k = 0; k < *modes; k++) {
+            const double *c = columns + (size_t)3 * i * rank + k;
+            (*out)[(size_t)k * n + i] =
+                towards_eye(from, model, at, (struct xyz){c[0], c[rank], c[2 * rank]});
+        }
+    }
+    bool fine = room && *out;
+    free(room);
+    return fine || fail(err, ERROR_SYSTEM, "out of memory for the display model's uncertainty");
+}
+
+struct xyz report_reached(const struct session_facts *facts, const struct lamp_report *from,
+                          const struct display_model *model, struct counts counts)
+{
+    struct way w = way_of(facts, from, model);
+    return leaves(&w, counts);
 }
 
 struct mat3 report_by_code(const struct lamp_report *from, const struct display_model *model,

@@ -12,8 +12,9 @@
 #include <string.h>
 
 #include "base/clock.h"
-#include "base/random.h"
 #include "calibration/budget_booth.h"
+#include "calibration/display_fit.h"
+#include "calibration/patches.h"
 #include "calibration/proof.h"
 #include "calibration/report_steps.h"
 #include "calibration/statistics.h"
@@ -28,14 +29,10 @@
 #include "simulator/world.h"
 
 enum { PATCHES = 12, SPOTS = 7, TEACH = 10, LAMPS = 3, EXPOSURE_US = 30000, CORRECTIONS = 3 };
-enum { RAMP = 12, APART = 12 }; // readings of the display: levels a channel, colours kept apart
 enum { TRUE_ACROSS = 120, TRUE_DOWN = 80, MAP_ACROSS = 60, MAP_DOWN = 40 };
 static const double LUX = 600; // the radiometer then reads every spot of the ceiling
 static const double COLLECTOR_LUX = 1000;
-// Ramps alone describe the panel here: it has less of what they cannot describe,
-// interaction of channels and shift of their colour, than the shipped one, as a
-// fitted model leaves less.
-static const double LEFT_OVER = 0.4;
+static const double PANEL_WHITE = 450; // twice the sample's: the chart uses most codes
 
 // ---- what all sessions share -------------------------------------------------------
 
@@ -95,7 +92,7 @@ static inline int make_shared(void **state)
     fine = fine && make_axis(&err);
     for (int i = 0; i < LAMPS; i++)
         shared.scenario.lamps[i].lux = LUX;
-    shared.scenario.panel.interaction = shared.scenario.panel.dispersion = LEFT_OVER;
+    shared.scenario.panel.white_cdm2 = PANEL_WHITE;
     shared.scenario.ceiling.true_px[0] = TRUE_ACROSS;
     shared.scenario.ceiling.true_px[1] = TRUE_DOWN;
     shared.scenario.ceiling.map_px[0] = MAP_ACROSS;
@@ -259,7 +256,12 @@ static inline bool scale_map(struct session_here *s)
     return true;
 }
 
-static inline bool set_up(struct session_here *s, int seed, struct error *err)
+struct lab_here;
+static inline void move_in(struct session_here *s, const struct lab_here *lab);
+
+// lab NULL: with a panel and a radiometer of its own.
+static inline bool set_up(struct session_here *s, int seed, const struct lab_here *lab,
+                          struct error *err)
 {
     s->scenario = shared.scenario;
     s->scenario.world.seed = seed;
@@ -272,11 +274,20 @@ static inline bool set_up(struct session_here *s, int seed, struct error *err)
                               .hurry = 1};
     char text[256];
     panel_init(&s->panel, &s->scenario.panel, seed);
+    if (lab)
+        move_in(s, lab);
     if (!lamp_make(&s->scenario, lamp, easel.centre, easel.normal, &s->lamp, err) ||
         !(s->radiometer = pr655_create(&o)))
         return false;
     talk(s, "PHOTO\r", text, sizeof text);
     return true;
+}
+
+static inline void close_up(struct session_here *s)
+{
+    luminance_map_fini(&s->map);
+    lamp_fini(&s->lamp);
+    pr655_destroy(s->radiometer);
 }
 
 static inline void true_light(struct session_here *s)
@@ -376,72 +387,68 @@ static inline struct lab lab_in(const struct truth *t, bool published, const str
     return lab;
 }
 
-// ---- the display, as it was characterised ---------------------------------------------
+// ---- a lab: a panel, a radiometer, and the display model made with it -----------------
 
-static inline bool read_codes(struct session_here *s, const double code[3], struct xyz *out)
+struct lab_here {
+    struct panel panel;
+    struct hidden_instrument radiometer;
+    struct display_model model;
+    struct display_uncertainty uncertainty;
+};
+
+static inline bool read_codes(struct session_here *s, struct counts codes, struct xyz *out)
 {
     struct spectrum radiance;
-    panel_patch(&s->panel, code, &s->light);
+    panel_patch(&s->panel, (const double[3]){codes.r, codes.g, codes.b}, &s->light);
     return read_light(s, out, &radiance);
 }
 
-// One channel's ramp in linear light, and its primary.
-static inline bool read_ramp(struct session_here *s, int c, struct xyz black,
-                             struct display_model *m)
+// In the dark, as boothcal display measure does.
+static inline bool characterise(struct session_here *s, uint64_t seed, struct measurements *m,
+                                struct error *err)
 {
-    double light[RAMP + 1];
-    struct xyz xyz = black;
-    for (int i = 0; i <= RAMP; i++) {
-        double code[3] = {0};
-        code[c] = (double)i / RAMP;
-        if (i && !read_codes(s, code, &xyz))
-            return false;
-        light[i] = xyz.X + xyz.Y + xyz.Z - black.X - black.Y - black.Z;
+    const struct patch_sizes sizes = {
+        .ramp_steps = 5, .near_black = 3, .random = 12, .white_every = 12};
+    struct patch_set set = {0};
+    bool fine = patch_set_characterise(&sizes, seed, &set, err);
+    *m = (struct measurements){.path = "hidden", .display = "hidden", .absolute = true};
+    m->patches = fine ? calloc((size_t)set.count, sizeof *m->patches) : NULL;
+    for (int i = 0; fine && i < set.count; i++) {
+        fine = read_codes(s, set.patches[i].counts, &set.patches[i].xyz);
+        m->patches[m->count++] =
+            (struct measured_patch){.counts = set.patches[i].counts, .xyz = set.patches[i].xyz};
     }
-    m->matrix[0][c] = xyz.X - black.X;
-    m->matrix[1][c] = xyz.Y - black.Y;
-    m->matrix[2][c] = xyz.Z - black.Z;
-    for (int k = 0; k < DISPLAY_NODES; k++) {
-        // straight between levels in light to the power of 1 / 2.2
-        double at = (double)k / (DISPLAY_NODES - 1) * RAMP;
-        int i = at < RAMP ? (int)at : RAMP - 1;
-        double low = pow(light[i] / light[RAMP], 1 / 2.2);
-        double high = pow(light[i + 1] / light[RAMP], 1 / 2.2);
-        m->curve[c][k] = pow(low + (at - i) * (high - low), 2.2);
-    }
-    display_curve_repair(m->curve[c]);
-    return true;
+    fine = fine && patch_set_white(&set, &m->white);
+    patch_set_fini(&set);
+    return fine;
 }
 
-static inline bool characterise(struct session_here *s, struct display_model *m)
+static inline bool lab_make(int seed, struct lab_here *lab, struct error *err)
 {
-    struct xyz black;
-    *m = (struct display_model){.name = "ramps"};
-    bool fine = read_codes(s, (const double[3]){0, 0, 0}, &black);
-    for (int c = 0; fine && c < 3; c++)
-        fine = read_ramp(s, c, black, m);
-    m->matrix[0][3] = black.X;
-    m->matrix[1][3] = black.Y;
-    m->matrix[2][3] = black.Z;
-    return fine && display_model_prepare(m, NULL);
+    const enum display_kind kind = DISPLAY_INTERACTION; // such is the panel
+    struct display_fit *found = calloc(1, sizeof *found);
+    struct session_here *s = calloc(1, sizeof *s);
+    struct measurements m = {0};
+    bool fine = s && found && set_up(s, seed, NULL, err) &&
+                characterise(s, (uint64_t)seed, &m, err) &&
+                display_fit(&m, &kind, &lab->model, found, err);
+    if (fine) {
+        lab->panel = s->panel;
+        lab->radiometer = s->hidden.radiometer;
+        lab->uncertainty = found->uncertainty;
+    }
+    measurements_fini(&m);
+    if (s)
+        close_up(s);
+    free(s);
+    free(found);
+    return fine;
 }
 
-// Its residual over colours that the ramps do not hold.
-static inline bool check(struct session_here *s, const struct display_model *m, int seed,
-                         struct vec3 *rms)
+static inline void move_in(struct session_here *s, const struct lab_here *lab)
 {
-    struct random random = random_stream((uint64_t)seed, 1);
-    struct xyz predicted[APART], read[APART];
-    for (int i = 0; i < APART; i++) {
-        double code[3], level = 0.2 + 0.5 * random_uniform(&random);
-        for (int c = 0; c < 3; c++)
-            code[c] = level + 0.3 * random_uniform(&random);
-        predicted[i] = display_forward(m, (struct counts){code[0], code[1], code[2]});
-        if (!read_codes(s, code, &read[i]))
-            return false;
-    }
-    *rms = budget_residual(predicted, read, APART, m->white);
-    return true;
+    s->panel = lab->panel;
+    s->hidden.radiometer = lab->radiometer;
 }
 
 // ---- what the eye sees -------------------------------------------------------------------

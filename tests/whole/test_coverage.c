@@ -14,10 +14,10 @@
 #include "tests/whole/hidden_booth.h"
 
 #ifdef __SANITIZE_ADDRESS__
-enum { SESSIONS = 24 };
+enum { SESSIONS = 24, LABS = 8 };
 static const double COVER_LEAST = 0.85, COVER_MOST = 1; // few sessions scatter
 #else
-enum { SESSIONS = 408 };
+enum { SESSIONS = 408, LABS = 68 };
 static const double COVER_LEAST = 0.92, COVER_MOST = 0.98; // as asked: 95 % within 3
 #endif
 
@@ -84,8 +84,8 @@ static bool measure_chart(struct session_here *s, struct budget_patch *patches,
 }
 
 // What the product would show for a sample, and what then leaves the screen.
-static bool predict(struct session_here *s, const struct display_model *m, struct budget_patch *p,
-                    struct xyz *screen)
+static void predict(struct session_here *s, const struct display_model *m, struct budget_patch *p,
+                    struct counts *counts, struct xyz *screen)
 {
     static const struct lamp_report along_the_normal = {.gains = {1, 1, 1, 1}};
     double k = s->booth.lux / 100 / M_PI, rho = s->scenario.panel.reflectance;
@@ -96,48 +96,55 @@ static bool predict(struct session_here *s, const struct display_model *m, struc
                                        k * (aim.Z - rho * white.Z)});
     double code[3] = {rint(255 * inverse.counts.r) / 255, rint(255 * inverse.counts.g) / 255,
                       rint(255 * inverse.counts.b) / 255};
-    struct xyz out = display_forward(m, (struct counts){code[0], code[1], code[2]});
+    *counts = (struct counts){code[0], code[1], code[2]};
+    struct xyz out = display_forward(m, inverse.counts); // rounding is one of the causes
     p->screen = (struct xyz){out.X + k * rho * white.X, out.Y + k * rho * white.Y,
                              out.Z + k * rho * white.Z};
     p->by_code = report_by_code(&along_the_normal, m, inverse.counts, 8);
     *screen = seen(s, code);
-    return inverse.in_gamut;
 }
 
-static void fill_shown(const struct session_here *s, struct vec3 rms, struct budget_input *in)
+static void fill_shown(const struct session_here *s, struct budget_input *in)
 {
     struct easel easel = easel_at(&s->scenario.stand, s->scenario.stand.tilt_deg);
     const double *e = s->scenario.head.eye_m;
     struct vec3 eye = {e[0], e[1], e[2]};
     in->scope = SCOPE_SHOWN;
-    in->display_rms = rms;
     in->reflectance = s->scenario.panel.reflectance;
     in->eye_distance_m = vec3_length(vec3_sub(eye, easel.centre));
     in->eye_angle_deg = asin(sqrt(sin2_from(&easel, eye))) * 180 / M_PI;
 }
 
 // The same chart again, not read but predicted.
-static bool predict_and_compare(struct session_here *s, int seed, struct budget_input *in,
-                                struct budget_patch *patches, struct truth *truth, struct tally *t,
-                                struct error *err)
+static bool predict_and_compare(struct session_here *s, const struct lab_here *lab, int seed,
+                                struct budget_input *in, struct budget_patch *patches,
+                                struct truth *truth, struct tally *t, struct error *err)
 {
-    struct display_model *m = calloc(1, sizeof *m);
+    struct lamp_report *shown = calloc(1, sizeof *shown);
     struct budget b = {0};
-    struct vec3 rms = {0};
-    bool fine = m && characterise(s, m) && check(s, m, seed, &rms);
-    fill_shown(s, rms, in);
-    for (int i = 0; fine && i < PATCHES; i++)
-        predict(s, m, &patches[i], &truth->screen[i]);
+    struct xyz *modes = NULL;
+    bool fine = shown != NULL;
+    fill_shown(s, in);
+    for (int i = 0; fine && i < PATCHES; i++) {
+        predict(s, &lab->model, &patches[i], &shown->patches[i].counts, &truth->screen[i]);
+        shown->patch_count = i + 1;
+    }
+    for (int c = 0; fine && c < 4; c++)
+        shown->gains[c] = 1;
+    fine = fine && report_display_modes(shown, &lab->model, &lab->uncertainty, &in->display_modes,
+                                        &modes, err);
+    in->display_mode = modes;
     fine = fine && budget_make(in, DRAWS, (uint64_t)seed, &b, err);
     if (fine)
         tally_session(&b, truth, t);
     budget_fini(&b);
-    free(m);
+    free(modes);
+    free(shown);
     return fine;
 }
 
-static bool state_and_compare(struct session_here *s, int seed, struct tally t[2],
-                              struct error *err)
+static bool state_and_compare(struct session_here *s, const struct lab_here *lab, int seed,
+                              struct tally t[2], struct error *err)
 {
     struct budget_patch *patches = calloc(PATCHES, sizeof *patches);
     struct spectrum *radiances = calloc(PATCHES, sizeof *radiances);
@@ -150,25 +157,22 @@ static bool state_and_compare(struct session_here *s, int seed, struct tally t[2
                 budget_make(&in, DRAWS, (uint64_t)seed, &b, err);
     if (fine)
         tally_session(&b, &truth, &t[SCOPE_MEASURED]);
-    fine = fine && predict_and_compare(s, seed, &in, patches, &truth, &t[SCOPE_SHOWN], err);
+    fine = fine && predict_and_compare(s, lab, seed, &in, patches, &truth, &t[SCOPE_SHOWN], err);
     budget_fini(&b);
     free(patches);
     free(radiances);
     return fine;
 }
 
-static bool session(int seed, struct tally t[2], struct error *err)
+static bool session(int seed, const struct lab_here *lab, struct tally t[2], struct error *err)
 {
     struct session_here *s = calloc(1, sizeof *s);
-    bool fine = s && set_up(s, seed, err);
+    bool fine = s && set_up(s, seed, lab, err);
     if (fine)
         true_light(s);
-    fine = fine && find_out(s, seed, err) && state_and_compare(s, seed, t, err);
-    if (s) {
-        luminance_map_fini(&s->map);
-        lamp_fini(&s->lamp);
-        pr655_destroy(s->radiometer);
-    }
+    fine = fine && find_out(s, seed, err) && state_and_compare(s, lab, seed, t, err);
+    if (s)
+        close_up(s);
     free(s);
     return fine;
 }
@@ -180,52 +184,74 @@ static struct tally each[SESSIONS][2];
 static int hold_sessions(void **state)
 {
     static bool fine[SESSIONS];
-    if (make_shared(state))
-        return -1;
+    struct lab_here *labs = calloc(LABS, sizeof *labs);
+    int failed = make_shared(state) || !labs;
+#pragma omp parallel for schedule(dynamic)
+    for (int i = 0; i < LABS; i++)
+        fine[i] = !failed && lab_make(5000 + i, &labs[i], NULL);
+    for (int i = 0; i < LABS; i++)
+        failed = failed || !fine[i];
 #pragma omp parallel for schedule(dynamic)
     for (int i = 0; i < SESSIONS; i++)
-        fine[i] = session(1000 + i, each[i], NULL);
+        fine[i] = !failed && session(1000 + i, &labs[i % LABS], each[i], NULL);
     for (int i = 0; i < SESSIONS; i++)
-        if (!fine[i])
-            return -1;
-    return 0;
+        failed = failed || !fine[i];
+    free(labs);
+    return failed ? -1 : 0;
 }
 
-static void assert_covered(enum budget_scope scope)
+static double share_of(const struct tally *t, int way, int from, int to)
 {
-    struct tally all = {0};
+    double within = 0, all = 0;
+    for (int k = from; k <= to; k++) {
+        within += t->within[way][k];
+        all += t->all[way][k];
+    }
+    return within / all;
+}
+
+static void sum_up(enum budget_scope scope, struct tally *all)
+{
+    *all = (struct tally){0};
     for (int i = 0; i < SESSIONS; i++)
         for (int k = 0; k < 6; k++) {
             const struct tally *t = &each[i][scope];
-            all.within[k / 3][k % 3] += t->within[k / 3][k % 3];
-            all.all[k / 3][k % 3] += t->all[k / 3][k % 3];
-            all.z2[k / 3][k % 3] += t->z2[k / 3][k % 3];
+            all->within[k / 3][k % 3] += t->within[k / 3][k % 3];
+            all->all[k / 3][k % 3] += t->all[k / 3][k % 3];
+            all->z2[k / 3][k % 3] += t->z2[k / 3][k % 3];
         }
-    for (int way = 0; way < 2; way++)
-        for (int k = 0; k < 3; k++) {
-            double share = (double)all.within[way][k] / all.all[way][k];
-            print_message(
-                "%s, delta %c: U covers the truth in %.1f %% of %d, rms error over u %.2f\n",
-                way ? "as published" : "absolute", "LCH"[k], 100 * share, all.all[way][k],
-                sqrt(all.z2[way][k] / all.all[way][k]));
-        }
-    for (int way = 0; way < 2; way++)
-        for (int k = 0; k < 3; k++) {
-            double share = (double)all.within[way][k] / all.all[way][k];
-            assert_true(share >= COVER_LEAST && share <= COVER_MOST);
-        }
+    for (int k = 0; k < 6; k++)
+        print_message("%s, delta %c: U covers the truth in %.1f %% of %d, rms error over u %.2f\n",
+                      k / 3 ? "as published" : "absolute", "LCH"[k % 3],
+                      100 * share_of(all, k / 3, k % 3, k % 3), all -> all[k / 3][k % 3],
+                      sqrt(all->z2[k / 3][k % 3] / all->all[k / 3][k % 3]));
 }
 
 static void what_is_read_from_the_screen_is_as_uncertain_as_stated(void **state)
 {
     (void)state;
-    assert_covered(SCOPE_MEASURED);
+    struct tally all;
+    sum_up(SCOPE_MEASURED, &all);
+    for (int k = 0; k < 6; k++) {
+        double share = share_of(&all, k / 3, k % 3, k % 3);
+        assert_true(share >= COVER_LEAST && share <= COVER_MOST);
+    }
 }
 
+// What the display model's own uncertainty calls local is an upper bound, alike
+// in lightness and colour: as published, where all that is common cancels, delta
+// L is stated generously.
 static void what_is_predicted_for_the_eye_is_as_uncertain_as_stated(void **state)
 {
     (void)state;
-    assert_covered(SCOPE_SHOWN);
+    struct tally all;
+    sum_up(SCOPE_SHOWN, &all);
+    for (int k = 0; k < 6; k++)
+        assert_true(share_of(&all, k / 3, k % 3, k % 3) >= COVER_LEAST);
+    for (int way = 0; way < 2; way++) {
+        double share = share_of(&all, way, 0, 2);
+        assert_true(share >= COVER_LEAST && share <= COVER_MOST);
+    }
 }
 
 int main(void)
