@@ -33,6 +33,20 @@ static inline pid_t child_of(pid_t parent, const char *name)
     return found;
 }
 
+// What both programs wrote from this place on; the caller frees it.
+static inline char *booth_log(const struct booth_here *b, long from)
+{
+    char path[300];
+    snprintf(path, sizeof path, "%s/log", b->folder.path);
+    FILE *file = fopen(path, "r");
+    char *text = calloc(1, 1 << 20);
+    if (file && text && fseek(file, from, SEEK_SET) == 0)
+        text[fread(text, 1, (1 << 20) - 1, file)] = 0;
+    if (file)
+        fclose(file);
+    return text;
+}
+
 // Starts both; scenario and settings are the shipped ones, then more lines of the scenario and
 // boothd's arguments as a shell reads them, where $run is the run folder.
 static inline bool booth_open(struct booth_here *b, const char *more_scenario,
@@ -64,23 +78,14 @@ static inline bool booth_open(struct booth_here *b, const char *more_scenario,
                           NULL};
     b->booth = start_program(argv, folder_at(&b->folder, "log"));
     struct control_client *client = connect_to(folder_at(&b->folder, "run/boothd.sock"), b->booth);
+    if (!client) {
+        char *text = booth_log(b, 0);
+        print_error("%s\n", text);
+        free(text);
+    }
     control_close(client);
     b->daemon = child_of(b->booth, "boothd");
     return client && b->daemon > 0;
-}
-
-// What both programs wrote from this place on; the caller frees it.
-static inline char *booth_log(const struct booth_here *b, long from)
-{
-    char path[300];
-    snprintf(path, sizeof path, "%s/log", b->folder.path);
-    FILE *file = fopen(path, "r");
-    char *text = calloc(1, 1 << 20);
-    if (file && text && fseek(file, from, SEEK_SET) == 0)
-        text[fread(text, 1, (1 << 20) - 1, file)] = 0;
-    if (file)
-        fclose(file);
-    return text;
 }
 
 static inline long booth_log_size(const struct booth_here *b)

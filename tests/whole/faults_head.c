@@ -15,10 +15,10 @@ static const double TRUE_EYE_M[3] = {0, 0.55, 0.65}, EYE_M = 0.02; // noise and 
 enum { OUTLIVED_MS = 400 }; // what waits longer than 250 ms is stale
 
 static struct row camera_rows[] = {
-    {"silent", .effect = MUTE, .lasts_s = 20, .name = "silent-for-long",
+    {"silent", .effect = MUTE, .lasts_s = 12, .name = "silent-for-long",
      .says = "no camera reports"},
     {"unplugged", .effect = GOES, .says = "no Wii remote"},
-    {"forbidden", .effect = GOES, .says = "udev rules", .first = "unplugged"},
+    {"forbidden", .effect = GOES, .says = "70-boothd.rules", .first = "unplugged"},
     {"silent", .effect = MUTE, .says = "no camera reports"},
     {"garbage", .effect = MUTE, .says = "no camera reports"},
     {"short", .effect = MUTE, .says = "no camera reports"},
@@ -28,7 +28,7 @@ static struct row camera_rows[] = {
 };
 
 static struct row opentrack_rows[] = {
-    {"silent", .effect = MUTE, .lasts_s = 20, .name = "silent-for-long", .says = "no pose"},
+    {"silent", .effect = MUTE, .lasts_s = 12, .name = "silent-for-long", .says = "no pose"},
     {"silent", .effect = MUTE, .says = "no pose"},
     {"garbage", .effect = MUTE, .says = "not within"},
     {"short", .effect = MUTE, .says = "24 bytes instead of 48"},

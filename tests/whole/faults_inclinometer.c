@@ -9,10 +9,10 @@
 static const double TRUE_TILT_DEG = 30, TILT_DEG = 0.1; // its noise and steps
 
 static struct row rows[] = {
-    {"silent", .effect = MUTE, .lasts_s = 20, .name = "silent-for-long",
+    {"silent", .effect = MUTE, .lasts_s = 12, .name = "silent-for-long",
      .says = "no answer from unit 80"},
     {"unplugged", .effect = GOES, .says = "No such file"},
-    {"forbidden", .effect = GOES, .says = "udev rules", .first = "unplugged"},
+    {"forbidden", .effect = GOES, .says = "70-boothd.rules", .first = "unplugged"},
     {"silent", .effect = MUTE, .says = "no answer from unit 80"},
     {"garbage", .effect = MUTE},
     {"short", .effect = MUTE},
@@ -28,7 +28,7 @@ static struct row rows[] = {
 };
 
 static struct row tcp_rows[] = {
-    {"half-open", .effect = MUTE, .lasts_s = 20, .name = "half-open-for-long", .says = "no answer"},
+    {"half-open", .effect = MUTE, .lasts_s = 12, .name = "half-open-for-long", .says = "no answer"},
     {"unplugged", .effect = GOES, .says = "refused"},
     {"silent", .effect = MUTE, .says = "no answer"},
     {"garbage", .effect = MUTE},

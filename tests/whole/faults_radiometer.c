@@ -14,7 +14,7 @@ static const double REPEATS = 0.02; // its noise, and the lamp that warms up
 
 static struct row rows[] = {
     {"unplugged", .effect = FAILS, .says = "is gone"},
-    {"forbidden", .effect = FAILS, .says = "udev rules", .first = "unplugged"},
+    {"forbidden", .effect = FAILS, .says = "70-boothd.rules", .first = "unplugged"},
     {"silent", .effect = FAILS, .says = "no answer in time"},
     {"garbage", .effect = FAILS, .says = "answered"},
     {"short", .effect = FAILS, .says = "no answer in time"},

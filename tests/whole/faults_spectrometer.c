@@ -9,14 +9,14 @@
 static const double LUX = 0.08; // of it: the lamp warms up by 2 %, the level is smoothed
 
 static struct row rows[] = {
-    {"silent", .effect = MUTE, .lasts_s = 20, .name = "silent-for-long",
+    {"silent", .effect = MUTE, .lasts_s = 12, .name = "silent-for-long",
      .says = "no answer in time"},
     {"unplugged", .effect = GOES, .says = "no spectrometer"},
     {"pulled-in-command", .effect = GOES, .says = "no spectrometer"},
     {"pulled-in-spectrum", .effect = GOES, .says = "no spectrometer"},
     {"moved", .effect = BLINKS},
     {"blank", .effect = GOES, .says = "its firmware did not load"},
-    {"forbidden", .effect = GOES, .says = "udev rules", .first = "unplugged"},
+    {"forbidden", .effect = GOES, .says = "70-boothd.rules", .first = "unplugged"},
     {"stall", .effect = RIDES},
     {"short", .effect = MUTE, .says = "bytes instead of"},
     {"silent", .effect = MUTE, .says = "no answer in time"},
