@@ -74,7 +74,6 @@ bool display_gl_upload(unsigned program, const struct display_model *model, stru
     glUseProgram(program);
     upload_curves(model, curves);
     give_matrix(program, model);
-    glUniform1i(at(program, "display_kind"), (GLint)model->kind);
     glUniform1f(at(program, "tolerance"), (float)tolerance);
     switch (model->kind) {
     case DISPLAY_DAY:

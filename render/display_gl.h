@@ -6,7 +6,7 @@
 #include "colorimetry/display.h"
 #include "render/texture.h"
 
-// Gives a program that holds inverse.glsl a prepared model: its curves and, for a
+// Gives a program that was made for its kind a prepared model: its curves and, for a
 // RESIDUAL, its table (colorimetry/display_table.h, some 0.1 s of work) in these
 // textures, the rest as uniforms. The context is current; SYSTEM without
 // memory.

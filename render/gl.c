@@ -38,7 +38,9 @@ struct renderer {
     struct context *context;
     int width, height;
     char name[256];
-    GLuint vertices, light_program, frame_program, light_target, frame_target;
+    GLuint vertices, light_program, light_target, frame_target;
+    GLuint frame_programs[DISPLAY_RESIDUAL + 1]; // by kind of display model, 0 until it is shown
+    GLuint frame_program;                        // that of the display shown
     GLuint textures[TEXTURE_COUNT];
     int bits_wanted;   // by the options
     int code_bits;     // of the counts texture
@@ -110,6 +112,16 @@ static bool size_counts(struct renderer *r, int bits, struct error *err)
     return complete(err);
 }
 
+static bool choose_program(struct renderer *r, enum display_kind kind, struct error *err)
+{
+    GLuint *program = &r->frame_programs[kind];
+    if (!*program && !(*program = program_make("frame.frag.glsl", kind, err)))
+        return false;
+    name_samplers(*program);
+    r->frame_program = *program;
+    return true;
+}
+
 static bool set_up(struct renderer *r, struct error *err)
 {
     GLint most = 0;
@@ -117,12 +129,10 @@ static bool set_up(struct renderer *r, struct error *err)
     if (r->width < 1 || r->height < 1 || r->width > most || r->height > most)
         return fail(err, ERROR_RANGE, "screen of %d x %d pixels: this OpenGL allows 1..%d",
                     r->width, r->height, most);
-    r->light_program = program_make("light.frag.glsl", err);
-    r->frame_program = r->light_program ? program_make("frame.frag.glsl", err) : 0;
-    if (!r->frame_program)
+    r->light_program = program_make("light.frag.glsl", DISPLAY_DAY, err);
+    if (!r->light_program || !choose_program(r, DISPLAY_DAY, err))
         return false;
     name_samplers(r->light_program);
-    name_samplers(r->frame_program);
     glGenVertexArrays(1, &r->vertices);
     glBindVertexArray(r->vertices);
     glGenTextures(TEXTURE_COUNT, r->textures);
@@ -162,7 +172,8 @@ void renderer_destroy(struct renderer *r)
         return;
     if (r->context && r->context->use(r->context, NULL)) {
         glDeleteProgram(r->light_program);
-        glDeleteProgram(r->frame_program);
+        for (int k = 0; k <= DISPLAY_RESIDUAL; k++)
+            glDeleteProgram(r->frame_programs[k]);
         glDeleteTextures(TEXTURE_COUNT, r->textures);
         glDeleteFramebuffers(1, &r->light_target);
         glDeleteFramebuffers(1, &r->frame_target);
@@ -320,6 +331,8 @@ static bool display_stage(struct renderer *r, const struct scene *scene, struct 
 {
     if (r->seen_display && same_display(&r->seen, scene))
         return true;
+    if (!choose_program(r, scene->display->kind, err))
+        return false;
     if (scene->view)
         view_gl_upload(r->frame_program, scene->view, (struct texture){r->textures[VIEW], VIEW});
     return display_gl_upload(r->frame_program, scene->display,

@@ -2,6 +2,7 @@
 #include "render/program.h"
 
 #include <epoxy/gl.h>
+#include <stdio.h>
 #include <string.h>
 
 static const struct {
@@ -18,14 +19,18 @@ static const char *text_of(const char *name)
     return "#error this shader was not embedded\n";
 }
 
-static GLuint compile(GLenum kind, const char *name, struct error *err)
+static GLuint compile(GLenum stage, const char *name, enum display_kind kind, struct error *err)
 {
+    char definition[40];
+    snprintf(definition, sizeof definition, "#define DISPLAY_KIND %d\n", (int)kind);
     const char *parts[] = {
-        text_of("head.glsl"),   text_of("display.glsl"), text_of("diffuse.glsl"),
-        text_of("output.glsl"), text_of("display_view.glsl"), text_of("view.glsl"),
-        text_of("inverse.glsl"), text_of(name),
+        text_of("head.glsl"),    definition,
+        text_of("display.glsl"), text_of("diffuse.glsl"),
+        text_of("output.glsl"),  text_of("display_view.glsl"),
+        text_of("view.glsl"),    text_of("inverse.glsl"),
+        text_of(name),
     };
-    GLuint shader = glCreateShader(kind);
+    GLuint shader = glCreateShader(stage);
     GLint good = GL_FALSE;
     glShaderSource(shader, sizeof parts / sizeof parts[0], parts, NULL);
     glCompileShader(shader);
@@ -51,10 +56,10 @@ static bool link_program(GLuint program, const char *fragment, struct error *err
     return fail(err, ERROR_SYSTEM, "program of %s: %s", fragment, log);
 }
 
-unsigned program_make(const char *fragment, struct error *err)
+unsigned program_make(const char *fragment, enum display_kind kind, struct error *err)
 {
-    GLuint vertex = compile(GL_VERTEX_SHADER, "frame.vert.glsl", err);
-    GLuint pixel = vertex ? compile(GL_FRAGMENT_SHADER, fragment, err) : 0;
+    GLuint vertex = compile(GL_VERTEX_SHADER, "frame.vert.glsl", kind, err);
+    GLuint pixel = vertex ? compile(GL_FRAGMENT_SHADER, fragment, kind, err) : 0;
     GLuint program = 0;
     if (pixel) {
         program = glCreateProgram();

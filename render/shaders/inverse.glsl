@@ -1,16 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // From XYZ that the screen must emit to linear light of its channels: the
 // inverse of whichever display model was kept (colorimetry/display.h). Goes on
-// where display.glsl ends; render/display_gl.c fills the uniforms.
+// where display.glsl ends; render/display_gl.c fills the uniforms. A program
+// holds one kind of model, DISPLAY_KIND: 0 day, 1 interaction, 2 residual.
 
-uniform int display_kind;  // 0 day, 1 interaction, 2 residual
 uniform vec3 black;        // the matrix's fourth column, cd/m2
 uniform vec3 from_xyz[3];  // rows: XYZ less black to plain Day's linear light
-uniform vec3 crosstalk[6]; // interaction: linear light by term
-uniform sampler2D table;   // residual: 64 nodes a row, of four texels: linear light to add, its
-                           // slopes by red, green, blue
-uniform vec3 table_least, table_scale;
-uniform int table_side;
 uniform float tolerance; // of the gamut test, in linear light
 
 vec3 inverse_day(vec3 target, vec4 gains)
@@ -22,6 +17,10 @@ vec3 inverse_day(vec3 target, vec4 gains)
         display_inverse_row(from_xyz[2].x, from_xyz[2].y, from_xyz[2].z, d.x, d.y, d.z));
     return light / gains.rgb;
 }
+
+#if DISPLAY_KIND == 1
+
+uniform vec3 crosstalk[6]; // linear light by term
 
 // What the channels take from and give to each other at l.
 vec3 inverse_terms(vec3 l)
@@ -48,31 +47,29 @@ mat3 inverse_slopes(vec3 l)
     return mat3(1.0) + mat3(red, green, blue);
 }
 
-// The light l with l + terms(l) = day, by Newton's method: a step is kept when
-// it comes nearer, else the plain one is taken, which always does.
-vec3 inverse_interaction(vec3 day)
+// The light l with l + terms(l) = day, by Newton's method. For what the model
+// may add (display_fold) four steps end in single precision.
+vec3 inverse_addition(vec3 day)
 {
     vec3 l = day;
-    vec3 off = -inverse_terms(l);
-    for (int i = 0; i < 4; i++) {
-        vec3 next = l + inverse(inverse_slopes(l)) * off;
-        vec3 left = day - next - inverse_terms(next);
-        if (dot(left, left) >= dot(off, off)) {
-            next = l + off;
-            left = day - next - inverse_terms(next);
-        }
-        l = next;
-        off = left;
-    }
+    for (int i = 0; i < 4; i++)
+        l += inverse(inverse_slopes(l)) * (day - l - inverse_terms(l));
     return l;
 }
+
+#elif DISPLAY_KIND == 2
+
+uniform sampler2D table; // 64 nodes a row, of four texels: linear light to add, its slopes by red,
+                         // green, blue
+uniform vec3 table_least, table_scale;
+uniform int table_side;
 
 vec3 inverse_texel(int node, int which)
 {
     return texelFetch(table, ivec2(((node & 63) << 2) + which, node >> 6), 0).rgb;
 }
 
-vec3 inverse_residual(vec3 day)
+vec3 inverse_addition(vec3 day)
 {
     display_corners at = display_find(display_axis(day.r, table_least.r, table_scale.r, table_side),
                                       display_axis(day.g, table_least.g, table_scale.g, table_side),
@@ -87,16 +84,20 @@ vec3 inverse_residual(vec3 day)
     return sum;
 }
 
+#else
+
+vec3 inverse_addition(vec3 day)
+{
+    return day;
+}
+
+#endif
+
 // Linear light, beyond 0..1 where the target is out of gamut. gains: of red,
 // green, blue and black towards the eye.
 vec3 inverse_linear(vec3 target, vec4 gains)
 {
-    vec3 day = inverse_day(target, gains);
-    if (display_kind == 1)
-        return inverse_interaction(day);
-    if (display_kind == 2)
-        return inverse_residual(day);
-    return day;
+    return inverse_addition(inverse_day(target, gains));
 }
 
 bool inverse_outside(vec3 linear)

@@ -9,6 +9,7 @@
 
 #include "base/clock.h"
 #include "calibration/statistics.h"
+#include "colorimetry/display_table.h"
 #include "render/material.h"
 #include "render/reference.h"
 #include "render/renderer.h"
@@ -18,13 +19,15 @@
 enum { RUNS = 9, MAP_WIDTH = 256, MAP_HEIGHT = 170, WIDTH = 1280, HEIGHT = 800 };
 
 struct bench {
-    struct renderer *renderer;
+    // The later ones are for the other kinds of display model and for poses, so
+    // that each redoes its own stages only.
+    struct renderer *renderer, *interacting, *corrected, *posed;
     struct scene scene;
     struct material material;
     struct luminance_map map, large;
     struct light_points lights;
     struct spectrum lamp;
-    struct display_model display;
+    struct display_model display, interaction, residual;
     struct band_set bands;
 };
 
@@ -41,12 +44,38 @@ static bool frame(struct bench *b, struct error *err)
     return renderer_show(b->renderer, &b->scene, true, NULL, err);
 }
 
+static bool frame_of(struct bench *b, struct renderer *renderer, const struct display_model *model,
+                     struct error *err)
+{
+    struct scene scene = b->scene;
+    scene.display = model;
+    return renderer_show(renderer, &scene, true, NULL, err);
+}
+
+static bool frame_interaction(struct bench *b, struct error *err)
+{
+    return frame_of(b, b->interacting, &b->interaction, err);
+}
+
+static bool frame_residual(struct bench *b, struct error *err)
+{
+    return frame_of(b, b->corrected, &b->residual, err);
+}
+
+static bool residual_table(struct bench *b, struct error *err)
+{
+    struct display_table *table = display_table_create(&b->residual, err);
+    free(table);
+    return table;
+}
+
 static bool pose(struct bench *b, struct error *err)
 {
     static int turn;
     struct stand stand = {{0, 0, 0}, {0, 0.2, 0.03}};
-    b->scene.booth_from_screen = stand_pose(&stand, 30 + 0.1 * (++turn % 7));
-    return frame(b, err);
+    struct scene scene = b->scene;
+    scene.booth_from_screen = stand_pose(&stand, 30 + 0.1 * (++turn % 7));
+    return renderer_show(b->posed, &scene, true, NULL, err);
 }
 
 static bool matrix(struct bench *b, struct error *err)
@@ -95,6 +124,9 @@ static const struct measure {
     bool (*run)(struct bench *b, struct error *err);
 } MEASURES[] = {
     {"patch frame (fill and present)", patch_frame}, {"surface frame", frame},
+    {"likewise, display with interaction", frame_interaction},
+    {"likewise, display with residual", frame_residual},
+    {"table of a residual per display", residual_table},
     {"surface frame after a pose change", pose},      {"band matrix per lamp", matrix},
     {"bake of the chart per lamp", bake},             {"median cut, 32 lights", cut},
     {"median cut, 4096 x 2048, 1024 lights", cut_large},
@@ -123,6 +155,22 @@ static bool fill_display(struct display_model *d, struct error *err)
     return display_model_prepare(d, err);
 }
 
+// Like those of panels whose channels take a tenth from each other.
+static bool fill_others(struct bench *b, struct error *err)
+{
+    static const double terms[3][DISPLAY_TERMS] = {
+        {-34, -9, -11, 9, -6, 2}, {-36, -22, -9, 4, 17, -1}, {-1, -31, -38, 0, 1, 19}};
+    b->interaction = b->residual = b->display;
+    b->interaction.kind = DISPLAY_INTERACTION;
+    memcpy(b->interaction.interaction, terms, sizeof terms);
+    b->residual.kind = DISPLAY_RESIDUAL;
+    b->residual.residual = (struct lattice){.least = {-10, -110, -130}, .most = {110, 115, 115}};
+    for (int k = 0; k < LATTICE_NODES; k++)
+        for (int n = 0; n < 3; n++)
+            b->residual.residual.node[k][n] = 4 * sin(0.1 * k + n);
+    return display_model_prepare(&b->interaction, err) && display_model_prepare(&b->residual, err);
+}
+
 static bool begin(struct bench *b, struct error *err)
 {
     static char names[24][64];
@@ -137,10 +185,13 @@ static bool begin(struct bench *b, struct error *err)
     fill_map(&b->map, MAP_WIDTH, MAP_HEIGHT);
     fill_map(&b->large, 4096, 2048);
     if (!b->map.luminance || !b->large.luminance || !illuminant("FL8", &b->lamp, err) || !band_set_shipped(6, &b->bands, err) ||
-        !fill_display(&b->display, err) ||
+        !fill_display(&b->display, err) || !fill_others(b, err) ||
         !material_chart("chart", palette, names, 24, 6, 4, 0.1, 0, &b->material, err) ||
         !median_cut(&b->map, CUT_VARIANCE, 32, &b->lights, err) ||
-        !(b->renderer = renderer_create(&options, err)))
+        !(b->renderer = renderer_create(&options, err)) ||
+        !(b->interacting = renderer_create(&options, err)) ||
+        !(b->corrected = renderer_create(&options, err)) ||
+        !(b->posed = renderer_create(&options, err)))
         return false;
     b->scene = (struct scene){.kind = SCENE_SURFACE,
                               .screen = {0.52, 0.325, WIDTH, HEIGHT},
@@ -212,5 +263,8 @@ int main(int argc, char **argv)
     if (json)
         fclose(json);
     renderer_destroy(b.renderer);
+    renderer_destroy(b.interacting);
+    renderer_destroy(b.corrected);
+    renderer_destroy(b.posed);
     return !fine;
 }
