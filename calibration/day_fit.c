@@ -430,7 +430,9 @@ bool day_fit(const struct measurements *m, enum display_kind kind, struct day_fi
     }
     free(f.targets);
     if (!solved || !display_model_prepare(&built, err))
-        return while_doing(err, "%s: RGB and XYZ of the patches belong to no display", m->path);
+        return while_doing(err, "%s: %s", m->path,
+                           kind == DISPLAY_DAY ? "RGB and XYZ of the patches belong to no display"
+                                               : "no channel interaction describes the patches");
     *at = found;
     *model = built;
     return true;

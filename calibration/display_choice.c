@@ -100,7 +100,7 @@ static void ask(const struct fold *fold, const struct measurements *m,
 void display_give_up(struct display_candidate *candidate, const struct error *why)
 {
     candidate->fitted = false;
-    snprintf(candidate->failed, sizeof candidate->failed, "%.150s", why->text);
+    snprintf(candidate->failed, sizeof candidate->failed, "%.390s", why->text);
 }
 
 // Fits a candidate to a fold and asks it for the rest. RESIDUAL starts from the

@@ -20,7 +20,7 @@ enum { DISPLAY_KIND_COUNT = DISPLAY_RESIDUAL + 1, DISPLAY_FOLDS = 5 };
 
 struct display_candidate {
     bool tried, fitted;     // fitted: on all patches and in every fold
-    char failed[160];       // why it was not
+    char failed[400];       // why it was not
     double mean;            // CIEDE2000 of the patches that the fold left out
     double worse, worse_se; // mean difference to the best, patch by patch, and its standard error
 };

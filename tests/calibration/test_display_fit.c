@@ -205,6 +205,54 @@ static void a_wild_reading_moves_no_model(void **state)
     }
 }
 
+// Top codes of red clip and even fall again, as on panels driven beyond their
+// range.
+static void a_ramp_that_falls_gives_curves_that_rise(void **state)
+{
+    (void)state;
+    static struct display_model model;
+    struct display_model p = panel(DISPLAY_DAY);
+    struct measurements m = measured(&p, 0.004);
+    struct display_fit found;
+    for (int i = 0; i < m.count; i++) {
+        struct counts c = m.patches[i].counts;
+        if (c.r > 0.8)
+            c.r = 0.8 - 0.1 * (c.r - 0.8);
+        m.patches[i].xyz = display_forward(&p, c);
+    }
+    m.white = display_forward(&p, (struct counts){0.78, 1, 1});
+    fit(&m, NULL, &model, &found);
+    for (int c = 0; c < 3; c++)
+        for (int k = 1; k < DISPLAY_NODES; k++)
+            assert_true(model.curve[c][k] > model.curve[c][k - 1]);
+    seed = 5;
+    for (int n = 0; n < 200; n++) {
+        struct counts c = {uniform(), uniform(), uniform()};
+        struct display_inverse back = display_invert(&model, display_forward(&model, c));
+        assert_near(back.counts.g, c.g, 1e-6);
+        assert_near(back.counts.r, c.r, 1e-6);
+    }
+    measurements_fini(&m);
+}
+
+static void two_dozen_patches_still_give_a_model_and_its_uncertainty(void **state)
+{
+    (void)state;
+    static struct display_model model;
+    struct display_model p = panel(DISPLAY_DAY);
+    struct measurements m = measured(&p, 0.004);
+    struct display_fit found;
+    for (int i = 0; i < 24; i++)
+        m.patches[i] = m.patches[i * 3 % 91];
+    m.count = 24;
+    fit(&m, NULL, &model, &found);
+    assert_string_equal(found.not_validated, "");
+    assert_true(found.choice.scored > 10 && found.choice.scored < 24);
+    double few = display_uncertainty_de00(&found.uncertainty, &model, (struct counts){1, 1, 1});
+    assert_true(few > 0.05 && few < 10);
+    measurements_fini(&m);
+}
+
 static void slopes_of_the_fit_are_those_of_its_colours(void **state)
 {
     (void)state;
@@ -287,6 +335,8 @@ int main(void)
         cmocka_unit_test(what_is_wished_for_is_what_is_fitted),
         cmocka_unit_test(cross_validation_does_not_depend_on_the_order_of_patches),
         cmocka_unit_test(a_wild_reading_moves_no_model),
+        cmocka_unit_test(a_ramp_that_falls_gives_curves_that_rise),
+        cmocka_unit_test(two_dozen_patches_still_give_a_model_and_its_uncertainty),
         cmocka_unit_test(slopes_of_the_fit_are_those_of_its_colours),
         cmocka_unit_test(real_panels_are_met_better_than_by_profiles),
     };
