@@ -384,6 +384,16 @@ bool bench_place_spectrometer(struct bench *b, const char *where, struct error *
     return by_hand(b, NULL, err, please);
 }
 
+bool bench_photograph(struct bench *b, const char *folder, struct error *err)
+{
+    char please[640];
+    snprintf(please, sizeof please,
+             "Photograph the ceiling at several exposures; put the pictures, list.csv and "
+             "camera.ini into %s",
+             folder);
+    return by_hand(b, json_pack("{ss,ss}", "do", CONTROL_PHOTOGRAPH, "folder", folder), err, please);
+}
+
 static json_t *sample_of(const struct spectrum *reflectance)
 {
     json_t *nm = json_array(), *values = json_array();

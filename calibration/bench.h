@@ -115,6 +115,10 @@ bool bench_aim_ceiling(struct bench *b, double x_m, double z_m, struct error *er
 // floor". Error CONFIG with an emulated booth, where it stands still.
 bool bench_place_spectrometer(struct bench *b, const char *where, struct error *err);
 
+// An exposure series of the ceiling as it is lit now: pictures, list.csv (see
+// photos.h) and camera.ini (see still_camera.h) in a folder that is there.
+bool bench_photograph(struct bench *b, const char *folder, struct error *err);
+
 // Absolute XYZ (cd/m2) that physical samples of those reflectances would send
 // from the aimed place. Emulated booth only.
 bool bench_truth(struct bench *b, const struct spectrum *reflectances, int count, struct xyz *out,

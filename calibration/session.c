@@ -19,6 +19,7 @@
 
 static const char USAGE[] =
     "usage: boothcal session --config FILE --maps FOLDER -o FOLDER [options]\n"
+    "       boothcal session --config FILE --photographs FOLDER -o FOLDER [options]\n"
     "\n"
     "From bare settings to an accuracy report, through the running boothd: teaches the\n"
     "lamps, characterises the display in the dark booth, proofs a chart under each lamp,\n"
@@ -28,6 +29,8 @@ static const char USAGE[] =
     "  --socket PATH        boothd's control socket (default: the settings', else the user's)\n"
     "  --booth PATH         control socket of an emulated booth\n"
     "  --maps FOLDER        luminance maps ceiling-LAMP.exr (cd/m2, channel Y)\n"
+    "  --photographs FOLDER the maps are made here: the ceiling is photographed into\n"
+    "                       FOLDER/LAMP, see boothcal light map --help\n"
     "  --lamp NAME[=TEXT]   a lamp of the booth, in order; TEXT is noted in the report\n"
     "                       (default: A, D50, D65)\n"
     "  --lamp-drift PERCENT a lamp stands still when it changes by less a minute\n"
@@ -41,7 +44,7 @@ static const char USAGE[] =
     "not every target was reached.\n";
 
 struct options {
-    const char *config, *socket, *booth, *maps, *out, *material;
+    const char *config, *socket, *booth, *maps, *photographs, *out, *material;
     const char *lamps[FACTS_LAMPS];
     int lamp_count;
     double lamp_drift;
@@ -61,6 +64,7 @@ static int parse(int argc, char **argv, struct options *o)
         {"booth", required_argument, NULL, 'b'},  {"maps", required_argument, NULL, 'm'},
         {"lamp", required_argument, NULL, 'l'},   {"material", required_argument, NULL, 'k'},
         {"rehearse", no_argument, NULL, 'r'},     {"out", required_argument, NULL, 'o'},
+        {"photographs", required_argument, NULL, 'p'},
         {"help", no_argument, NULL, 'h'},         {"lamp-drift", required_argument, NULL, 'd'},
         {0},
     };
@@ -72,6 +76,7 @@ static int parse(int argc, char **argv, struct options *o)
         case 's': o->socket = optarg; break;
         case 'b': o->booth = optarg; break;
         case 'm': o->maps = optarg; break;
+        case 'p': o->photographs = optarg; break;
         case 'k': o->material = optarg; break;
         case 'r': o->rehearse = true; break;
         case 'o': o->out = optarg; break;
@@ -88,8 +93,9 @@ static int parse(int argc, char **argv, struct options *o)
         default: return COMMAND_USAGE;
         }
     }
-    if (optind != argc || !o->config || !o->maps || !o->out)
-        return misused("--config, --maps and --out are needed; see --help");
+    if (optind != argc || !o->config || !o->maps == !o->photographs || !o->out)
+        return misused("--config, --out and either --maps or --photographs are needed; see "
+                       "--help");
     return 0;
 }
 
@@ -111,8 +117,12 @@ static bool check_paths(struct session *s, const struct options *o, struct error
 {
     if (mkdir(o->out, 0777) && errno != EEXIST)
         return fail_errno(err, "%s", o->out);
+    if (o->photographs && mkdir(o->photographs, 0777) && errno != EEXIST)
+        return fail_errno(err, "%s", o->photographs);
     if (!path_absolute(o->out, s->out, sizeof s->out, err) ||
-        !path_absolute(o->maps, s->maps, sizeof s->maps, err))
+        !path_absolute(o->maps ? o->maps : o->out, s->maps, sizeof s->maps, err) ||
+        (o->photographs &&
+         !path_absolute(o->photographs, s->photographs, sizeof s->photographs, err)))
         return false;
     if (access(s->out, W_OK))
         return fail_errno(err, "%s", s->out);
@@ -123,7 +133,7 @@ static bool check_paths(struct session *s, const struct options *o, struct error
     for (int i = 0; i < s->facts->lamp_count; i++) {
         char map[512];
         session_map(s, i, map, sizeof map);
-        if (access(map, R_OK))
+        if (!*s->photographs && access(map, R_OK))
             return fail(err, ERROR_CONFIG, "%s: cannot be read: the luminance map of lamp %s", map,
                         s->facts->lamps[i].name);
     }

@@ -16,6 +16,7 @@ struct session {
     struct session_facts *facts;
     char out[400];         // folder of the results, absolute
     char maps[400];        // folder of luminance maps "ceiling-<lamp>.exr", absolute
+    char photographs[400]; // folder of what is photographed for them, absolute; "" = they are there
     const char *material;  // chart to proof
     bool rehearse;         // few patches only: shows that the chain works
     double lamp_drift;     // relative change per minute of a lamp that stands still, 0 = the plan's
@@ -38,7 +39,8 @@ enum session_stage { STAGE_TAUGHT, STAGE_CHARACTERISED, STAGE_REPORTED };
 // and puts it in force. It is valid anew from the second stage on.
 bool session_store(struct session *s, enum session_stage stage, struct error *err);
 
-// Teaches lamp i from live readings, scales its luminance map by spot readings
+// Teaches lamp i from live readings, makes its luminance map of an exposure series
+// where s->photographs says so, scales its luminance map by spot readings
 // and writes what was taught (not the map itself) into boothd's lamp folder.
 bool session_teach(struct session *s, int lamp, struct error *err);
 

@@ -3,6 +3,7 @@
 // The tests follow one another in one running booth.
 #include "tests/fakes/support.h"
 
+#include "files/exr.h"
 #include "tests/whole/running.h"
 
 #include "tests/whole/booth_here.h"
@@ -16,6 +17,7 @@ static const double DRIFT_PERCENT = 10; // a minute; both lamps begin with 100 o
 static const double LUX = 0.01;         // slope of 10 % a minute with 4 s left, and noise
 static const double XY = 0.002;         // noise of the emulated spectrometer
 static const double CCT_K = 20;
+static const double MAP = 0.02; // the reach of a map, and a lamp that still warms up by 0.5 %
 
 static struct booth_here booth;
 static struct control_client *booth_client;
@@ -159,6 +161,44 @@ static void a_lamp_that_does_not_stand_still_in_time_is_refused(void **state)
     assert_int_equal(access(folder_at(&booth.folder, "run/lamps/D65.ini"), F_OK), -1);
 }
 
+// The lamp that is on is D50.
+static void the_ceiling_is_photographed_and_measured_into_a_map(void **state)
+{
+    (void)state;
+    struct error err = {0};
+    struct exr truth = {0}, map = {0};
+    char list[256], camera[256], out[256];
+    const char *pictures = folder_at(&booth.folder, "pictures");
+    snprintf(list, sizeof list, "%s/list.csv", pictures);
+    snprintf(camera, sizeof camera, "%s/camera.ini", pictures);
+    snprintf(out, sizeof out, "%s/map.exr", pictures);
+    json_t *reply =
+        control_call(booth_client, json_pack("{ss,ss}", "do", "photograph", "folder", pictures),
+                     BOOTH_CALL_MS, &err);
+    if (!reply)
+        print_error("%s\n", err.text);
+    assert_non_null(reply);
+    json_decref(reply);
+    int status = LIGHT("map", list, "-o", out, "--camera", camera, "--measure", "--lamp", "D50",
+                       "--pixels", "256,170");
+    if (status)
+        print_error("%s\n", said());
+    assert_int_equal(status, 0);
+    assert_holds(said(), "7 spot readings");
+    assert_true(exr_load(out, &map, &err) &&
+                exr_load(folder_at(&booth.folder, "pictures/truth.exr"), &truth, &err));
+    const float *Y = map.pixels + exr_channel(&map, "Y") * 256 * 170;
+    double all = 0, wanted = 0;
+    for (int i = 0; i < 256 * 170; i++) {
+        all += (double)Y[i];
+        wanted += (double)truth.pixels[i];
+    }
+    print_message("mean luminance off by %+.2f %%\n", 100 * (all / wanted - 1));
+    assert_near(all / wanted, 1, MAP);
+    exr_fini(&map);
+    exr_fini(&truth);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -167,6 +207,7 @@ int main(void)
         cmocka_unit_test(a_lamp_that_could_not_be_told_from_it_is_refused),
         cmocka_unit_test(another_one_is_taught_beside_it_and_both_are_listed),
         cmocka_unit_test(taught_again_a_lamp_keeps_its_map_at_the_same_luminance),
+        cmocka_unit_test(the_ceiling_is_photographed_and_measured_into_a_map),
         cmocka_unit_test(a_lamp_that_does_not_stand_still_in_time_is_refused),
     };
     return cmocka_run_group_tests(tests, open_booth, close_booth);
