@@ -233,7 +233,7 @@ static void print_json(const struct linearity_facts *f, int in_use, const char *
 static bool at_the_bench(struct spectrometer_command *c, struct exposures *e, struct error *err)
 {
     struct error later = {0};
-    bool fine = bench_light(&c->bench, c->lamp, "a steady lamp on direct current", err) &&
+    bool fine = bench_light(&c->bench, c->lamp, "a steady, warm lamp on direct current", err) &&
                 choose(c, err) && measure(c, e, err);
     return bench_lid(&c->bench, false, fine ? err : &later) && fine;
 }
