@@ -45,11 +45,14 @@ if [ "$1" = --inside ]; then
         "$programs/boothcal" tilt $booth --store --keep "$out/poses.csv"
         # shellcheck disable=SC2086
         "$programs/boothcal" tracker $booth --store --keep "$out/points.csv"
+        set -- "$@" --photographs "$out/photographs"
+    else
+        set -- "$@" --maps "$run"
     fi
     for lamp in $lamps; do set -- "$@" --lamp "$lamp=$(spectrum_of $lamp)"; done
     status=0
     "$programs/boothcal" session --config "$run/boothd.conf" --socket "$run/boothd.sock" \
-        --booth "$run/boothsim.sock" --photographs "$run/photographs" --lamp-drift 5 --out "$out" "$@" || status=$?
+        --booth "$run/boothsim.sock" --lamp-drift 5 --out "$out" "$@" || status=$?
     [ $status = 0 ] || [ $status = 3 ] || exit $status
     # The last lamp is still on: does the proof keep to what a lab may ask for?
     verified=0
