@@ -88,8 +88,8 @@ static void the_direction_of_a_pixel_leads_back_to_it(void **state)
 {
     (void)state;
     struct lens lens = lens_make(&booth.ceiling_camera);
-    for (double at_x = 0; at_x < 1280; at_x += 91)
-        for (double at_y = 0; at_y < 960; at_y += 77) {
+    for (double at_x = 0; at_x < booth.ceiling_camera.width_px; at_x += 57)
+        for (double at_y = 0; at_y < booth.ceiling_camera.height_px; at_y += 48) {
             struct vec3 d = lens_direction(&lens, at_x, at_y);
             double x, y;
             assert_true(lens_project(&lens, vec3_add(lens.place, vec3_scale(d, 0.7)), &x, &y));
