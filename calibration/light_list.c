@@ -155,8 +155,11 @@ int light_list_command(int argc, char **argv)
     }
     booth_preset(booth);
     bool placed;
-    if ((o.config && !store_settings(o.config, booth, &placed, &err)) ||
-        !lamps_load(o.folder ? o.folder : booth->lamps.folder, &lamps, &err))
+    bool fine = !o.config || store_settings(o.config, booth, &placed, &err);
+    const char *folder = o.folder ? o.folder : booth->lamps.folder;
+    if (fine && !*folder)
+        fine = fail(&err, ERROR_CONFIG, "%s: the store has no lamps yet", o.config);
+    if (!fine || !lamps_load(folder, &lamps, &err))
         code = command_failed(&err);
     else
         code = show(&o, &lamps, booth->state.lamp_distance);

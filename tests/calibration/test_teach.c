@@ -257,6 +257,18 @@ static void a_folder_that_is_not_there_is_refused(void **state)
     assert_holds(c.complained, "/no/such/folder");
     LIST("--json");
     assert_int_equal(c.code, COMMAND_USAGE);
+    char shipped[8192], whole[8300];
+    FILE *in = fopen("config/booths/emulated.conf", "r");
+    assert_non_null(in);
+    shipped[fread(shipped, 1, sizeof shipped - 1, in)] = 0;
+    fclose(in);
+    char *lamps = strstr(shipped, "folder = lamps"); // left to a store that is empty
+    assert_non_null(lamps);
+    memcpy(lamps, "#             ", 14);
+    snprintf(whole, sizeof whole, "%s\n[calibration]\nstore = none\n", shipped);
+    LIST("--config", folder_put(&folder, "booth.conf", whole));
+    assert_int_equal(c.code, COMMAND_USAGE);
+    assert_holds(c.complained, "no lamps yet");
 }
 
 int main(void)
