@@ -8,7 +8,7 @@
 
 static const struct command FAMILIES[] = {
     {"colour", command_colour, "deltae|spectrum", "colour differences; colours of spectra"},
-    {"display", command_display, "measure|view|fit|check|forward|inverse|export", "the display model of a panel"},
+    {"display", command_display, "measure|view|fit|check|verify|forward|inverse|export", "the display model of a panel"},
     {"bands", command_bands, "optimise|check", "the bands that carry reflectances"},
     {"light", command_light, "teach|map|points|list", "the lamps of the booth and their luminance maps"},
     {"session", command_session, "--config FILE --maps FOLDER -o FOLDER",

@@ -276,6 +276,8 @@ int command_display(int argc, char **argv)
          "             white, with exit 3\n"
          "  --json     one JSON object\n"
          "  --help"},
+        {"verify", command_verify, "--config FILE [OPTION]...",
+         "Shows patches of counts and the chart now and judges them: the same as boothcal verify."},
         {"forward", command_forward, "D.ini [--uncertainty]",
          "Reads \"R G B\" (0..100) a line, writes \"X Y Z\" in cd/m2 a line.\n"
          "\n"
