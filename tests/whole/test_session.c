@@ -23,11 +23,11 @@
 
 #ifdef __SANITIZE_ADDRESS__
 #define OPTION "--rehearse"
-static const double SCREEN_MEAN = 0.9, SCREEN_MAX = 2.7, WHITE_PERCENT = 1.5;
+static const double SCREEN_MEAN = 0.9, SCREEN_MAX = 2.7, WHITE_PERCENT = 2.5;
 static const bool TARGETS = false;
 #else
 #define OPTION ""
-static const double SCREEN_MEAN = 0.6, SCREEN_MAX = 1.8, WHITE_PERCENT = 1.0;
+static const double SCREEN_MEAN = 0.6, SCREEN_MAX = 1.8, WHITE_PERCENT = 1.5;
 static const bool TARGETS = true;
 #endif
 static const double BANDS_MEAN = 0.10, BANDS_MAX = 0.30; // six bands, under A, FL8 and FL3.15
@@ -124,7 +124,7 @@ static void white_has_its_absolute_luminance_at_every_tilt(void **state)
         measured++;
         assert_true(fabs(number_of(pose, "white_luminance_error_percent")) <= WHITE_PERCENT);
     }
-    assert_int_equal(measured, 4);
+    assert_int_equal(measured, 4 + 3); // tilts, and directions off the normal
 }
 
 static void tilt_and_eye_are_seen_where_they_are(void **state)
