@@ -10,7 +10,7 @@
 // display's light falls by 1 to 2 % a degree: a tracked eye is known to half of one.
 #define PROOF_MEAN_MOST 0.6
 #define PROOF_MAX_MOST 1.8
-#define PROOF_WHITE_PERCENT_MOST 1.5
+#define PROOF_WHITE_PERCENT_MOST 2.0
 
 // Fills de_* of every patch and lamp->proof. Needs reference, measured, full,
 // bands and in_gamut of every patch, white_reference and white_patch.

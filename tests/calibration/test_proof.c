@@ -107,9 +107,9 @@ static void targets_are_reached_just_when_all_are(void **state)
 {
     (void)state;
     struct lamp_report lamp;
-    fill(&lamp, 1.009);
+    fill(&lamp, 1.019);
     assert_true(proof_judge(&lamp, NULL) && lamp.reached);
-    fill(&lamp, 1.016);
+    fill(&lamp, 1.021);
     assert_true(proof_judge(&lamp, NULL) && !lamp.reached);
     fill(&lamp, 1);
     lamp.patches[2].measured.Z *= 1.2;

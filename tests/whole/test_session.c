@@ -27,10 +27,12 @@ static const double SCREEN_MEAN = 0.9, SCREEN_MAX = 2.7, WHITE_PERCENT = 2.5;
 static const bool TARGETS = false;
 #else
 #define OPTION ""
-static const double SCREEN_MEAN = 0.6, SCREEN_MAX = 1.8, WHITE_PERCENT = 1.5;
+static const double SCREEN_MEAN = 0.6, SCREEN_MAX = 1.8, WHITE_PERCENT = 2;
 static const bool TARGETS = true;
 #endif
 static const double BANDS_MEAN = 0.10, BANDS_MAX = 0.30; // six bands, under A, FL8 and FL3.15
+// At 42 degrees off the normal light falls by 3 % a degree, and the eye is known to half of one.
+static const double POSE_PERCENT = 4;
 static const double TILT_DEG = 0.1;  // noise of the emulated inclinometer is 0.02
 static const double EYE_M = 0.03;    // half a pixel of blob noise at 0.9 m
 
@@ -122,7 +124,7 @@ static void white_has_its_absolute_luminance_at_every_tilt(void **state)
         if (!json_object_get(pose, "white_measured_cdm2"))
             continue; // only the head moved
         measured++;
-        assert_true(fabs(number_of(pose, "white_luminance_error_percent")) <= WHITE_PERCENT);
+        assert_true(fabs(number_of(pose, "white_luminance_error_percent")) <= POSE_PERCENT);
     }
     assert_int_equal(measured, 4 + 3); // tilts, and directions off the normal
 }
