@@ -13,6 +13,18 @@
 
 static const unsigned STAND_ROWS = 1u << STORED_HINGE | 1u << STORED_CENTRE | 1u << STORED_TURNED;
 
+bool geometry_take_option(int letter, const char *value, struct geometry_options *o)
+{
+    const char **const texts[] = {&o->config, &o->socket, &o->booth, &o->in, &o->keep, &o->out};
+    static const char LETTERS[] = "csbfko";
+    const char *found = letter ? strchr(LETTERS, letter) : NULL;
+    if (found)
+        *texts[found - LETTERS] = value;
+    o->store = o->store || letter == 'S';
+    o->json = o->json || letter == 'j';
+    return found || letter == 'S' || letter == 'j';
+}
+
 bool geometry_can_store(const struct booth_settings *booth, struct error *err)
 {
     struct store_place place;

@@ -17,6 +17,10 @@ struct geometry_options {
     bool store, json;
 };
 
+// Takes an option that both have, by its letter: c config, s socket, b booth,
+// f in, k keep, o out, S store, j json. value is borrowed. False for any other.
+bool geometry_take_option(int letter, const char *value, struct geometry_options *out);
+
 // One found value of a report.
 struct geometry_value {
     const char *name, *unit;

@@ -74,32 +74,9 @@ static bool take_number(const char *name, const char *text, double least, double
 
 static bool take_option(int c, struct options *o, struct error *err)
 {
-    struct geometry_options *k = &o->keep;
+    if (geometry_take_option(c, optarg, &o->keep))
+        return true;
     switch (c) {
-    case 'c':
-        k->config = optarg;
-        return true;
-    case 's':
-        k->socket = optarg;
-        return true;
-    case 'b':
-        k->booth = optarg;
-        return true;
-    case 'f':
-        k->in = optarg;
-        return true;
-    case 'k':
-        k->keep = optarg;
-        return true;
-    case 'o':
-        k->out = optarg;
-        return true;
-    case 'S':
-        k->store = true;
-        return true;
-    case 'j':
-        k->json = true;
-        return true;
     case 't':
         return take_number("tilt", optarg, -180, 180, &o->tilt_deg, err);
     case 'u':
